@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
-from epicycle.actors import Actor, InputPort, Moment, Receiver, StateMachine, Tag, Wake
+from epicycle.actors import Actor, InputPort, Moment, Receiver, StateMachine, Tag, Wake, paths
 from epicycle.runner.execution.engine import (
     Activation,
     BoundaryPort,
@@ -22,7 +22,7 @@ from epicycle.runner.execution.engine import (
     Refinement,
 )  # fmt: skip
 from epicycle.runner.model.catalogue import Dialect
-from epicycle.runner.model.graph import ModelGraph, is_within, steps
+from epicycle.runner.model.graph import ModelGraph, steps
 from epicycle.runner.model.text import Limits
 
 M = TypeVar("M", Wake, Moment)
@@ -137,7 +137,7 @@ class PostedComposites(Directors):
         return is_posted(self.graph.domains[composite].dialect, type(self.director))
 
     def boundary_port(self, path: str, outside: Director | Refinement) -> BoundaryPort:
-        kind = PostedPort if self._is_ours(self.graph.owner(path)) else BoundaryPort
+        kind = PostedPort if self._is_ours(paths.parent(path)) else BoundaryPort
         return kind(path, outside)
 
     def prepare(self, composite: str, outside: Director | Refinement) -> None:
@@ -174,7 +174,7 @@ class PostedComposites(Directors):
         around = before if self.borders else ""
         while around:
             around = around.rpartition(".")[0]
-            if around in self.borders and not is_within(path, around):
+            if around in self.borders and not paths.is_within(path, around):
                 self.borders[around].post()
 
 
@@ -253,7 +253,7 @@ class CompositeBoundary(Actor):
         self.before, self.behind = inputs, outputs
         self._director = director
         self._outside = outside
-        ranks = [rank for each, rank in director.ranks.items() if is_within(each, composite)]
+        ranks = [rank for each, rank in director.ranks.items() if paths.is_within(each, composite)]
         self._first, self._last = min(ranks), max(ranks)
         self._came_in: Tag | None = None  # when something came in
         self._resumed: Tag | None = None  # when a deferred firing was executed

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from itertools import groupby
 from typing import Any
 
-from epicycle.actors import counted, declared_parameters, plain, type_name
+from epicycle.actors import counted, declared_parameters, paths, plain, type_name
 
 from ..model.build.model import Model
 from ..model.catalogue.reference import as_written, shown
@@ -125,7 +125,7 @@ def contents(model: Model) -> Contents:
         "ports": {
             path: {"direction": graph.direction(path), "type": type_name(graph.type_of(path))}
             for path in graph.ports
-            if graph.components[graph.owner(path)].kind
+            if graph.components[paths.parent(path)].kind
         },
         "connections": _connections(model),
         "aspects": {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from epicycle.actors import Parameter, declared_parameters
+from epicycle.actors import Parameter, declared_parameters, paths
 
 from ..model.catalogue.reference import as_written, doc_of, first_sentence, shown
 from ..model.text.document import Mapping as MappingNode
@@ -149,7 +149,7 @@ def local_ends(knowledge: Knowledge, source: str, target: str) -> tuple[str, str
         first = each.replace("[*]", "[0]")
         if first not in graph.ports:
             raise EditError(f"there is no port {each}")
-        owners.append((graph.owner(first), graph.direction(first)))
+        owners.append((paths.parent(first), graph.direction(first)))
     (one, from_), (other, to) = owners
     # Seen from inside, tokens come from an input of the composite, and go to an output.
     scope = one if from_ == "input" else one.rpartition(".")[0]

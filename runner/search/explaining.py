@@ -9,7 +9,7 @@ from itertools import chain, islice, zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from epicycle.actors import EpicycleError, to_seconds
+from epicycle.actors import EpicycleError, paths, to_seconds
 
 from ..execution.engine import Interventions, Simulation
 from ..execution.results import Results, Verdict, canonical, plain
@@ -291,7 +291,7 @@ def _steps(graph: ModelGraph, ports: Collection[str], ours: Sends, theirs: Sends
         if found and step.time > found[-1].time:
             break
         found.append(step)
-        inputs = graph.actors[graph.owner(step.port)].inputs.values()
+        inputs = graph.actors[paths.parent(step.port)].inputs.values()
         sources = {wire.source.path for port in inputs for wire in graph.wires_to(port)}
     return found[::-1]
 

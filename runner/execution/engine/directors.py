@@ -6,9 +6,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, cast
 
+from epicycle.actors import paths
+
 from ...model.graph.clock import Clock
 from ...model.graph.model_graph import ModelGraph
-from ...model.graph.nodes import is_within
 from .director import Director
 from .local_time import BoundaryPort, LocalDirector
 from .refinement import ModeDirector, Outer, Refinement
@@ -52,8 +53,8 @@ class Directors:
     def _add_director(self, composite: str, clock: Clock) -> None:
         """The options of a composite's own director."""
         outside = self.base(self.graph.director_of(composite)) if composite else self.director
-        for paths in self.graph.borders(composite):
-            self.boundary_ports.update({path: self.boundary_port(path, outside) for path in paths})
+        for ports in self.graph.borders(composite):
+            self.boundary_ports.update({path: self.boundary_port(path, outside) for path in ports})
         self.prepare(composite, outside)
         self.of[composite] = self._made_director(composite, clock)
         if path := self.graph.domains[composite].machine:
@@ -111,10 +112,10 @@ class Directors:
     def _begin_anew(self, refinement: str) -> None:
         """Restart the contents of a refinement."""
         for path, boundary_port in self.boundary_ports.items():
-            if is_within(path, refinement):
+            if paths.is_within(path, refinement):
                 boundary_port.clear()
         for path, actor in self.actors.items():
-            if is_within(path, refinement):
+            if paths.is_within(path, refinement):
                 execution = self.executions.get(path)
                 if execution is not None:
                     execution.kill()

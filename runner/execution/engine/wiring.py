@@ -14,6 +14,7 @@ from epicycle.actors import (
     OutputPort,
     Receiver,
     declared_parameters,
+    paths,
 )
 from epicycle.aspects import (
     ActorPoint,
@@ -231,7 +232,7 @@ class Wiring:
             far, taken = edge.destination, (*edges, edge)
             if wires is not None and not any(wire[: len(taken)] == taken for wire in wires):
                 continue
-            if self.graph.owner(far) in self.actors:
+            if paths.parent(far) in self.actors:
                 onward = self._put(taken)
             else:
                 onward = all_of(self._heard(far) + self._branches(far, taken, wires))

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import Tag
+from epicycle.actors import Tag, paths
 
 from ...support.collection import without_collection
 from ..catalogue.code import code_of
 from ..graph.acts import ActName
 from ..graph.model_graph import ModelGraph
-from ..graph.nodes import is_within
 from ..graph.outputs import OutputSpec
 from ..graph.ranks import firing_order
 from ..graph.woven import WovenAspect, check_processors
@@ -141,6 +140,6 @@ class Building:
         self.aspects = [
             woven.without(path)
             for woven in self.aspects
-            if not is_within(woven.name, path) and not (woven.model and is_within(woven.model.path, path))
+            if not paths.is_within(woven.name, path) and not (woven.model and paths.is_within(woven.model.path, path))
         ]
         self.output = self.output.without(path)

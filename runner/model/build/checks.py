@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
-from epicycle.actors import InputPort, accepts, counted, type_name
+from epicycle.actors import InputPort, accepts, counted, paths, type_name
 
 from ..graph.digraph import find_loop, in_order
 from ..graph.model_graph import ModelGraph
@@ -123,7 +123,7 @@ def _stretches(graph: ModelGraph, path: str) -> Iterator[tuple[Edge, ...]]:
 
 def _who(graph: ModelGraph, port: str) -> str:
     """Whose port it is, and where that is declared."""
-    owner = graph.owner(port)
+    owner = paths.parent(port)
     if owner in graph.actors:
         what, at = f"{owner} is a {type(graph.actors[owner]).__name__}", graph.position_of(owner)
     else:
@@ -217,7 +217,7 @@ def _shortest_loop(graph: ModelGraph, inner: Any, region: Region) -> list[list[E
 
 
 def _add_loop(graph: ModelGraph, ways: list[list[Edge]], problems: Problems) -> None:
-    actors = [graph.owner(way[0].source) for way in ways]
+    actors = [paths.parent(way[0].source) for way in ways]
     blamed: Edge | None = next((edge for way in ways for edge in way if isinstance(edge, Detour)), None)
     if isinstance(blamed, Detour):
         fewer = "attach it to fewer of them, or give that model a delay"
@@ -249,9 +249,9 @@ def _step(way: list[Edge]) -> str:
 
 def _scope(graph: ModelGraph, edge: Edge) -> str:
     """The path of the composite inside which a connection is made, with a dot after each name."""
-    owner = edge.source.rpartition(".")[0]
+    owner = paths.parent(edge.source)
     # Tokens from an input come from the composite's own port, others from a port of one of its actors.
-    scope = owner if graph.direction(edge.source) == "input" else owner.rpartition(".")[0]
+    scope = owner if graph.direction(edge.source) == "input" else paths.parent(owner)
     return f"{scope}." if scope else ""
 
 

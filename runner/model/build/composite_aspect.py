@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import chain
 
-from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
+from epicycle.actors import OutputPort, accepts, declared_parameters, paths, type_name
 from epicycle.aspects import Aspect, CompositeAspect, FiringTime, Request
 
 from ..graph.acts import connection_place
@@ -104,7 +104,7 @@ def _request(view: Pointcuts, inputs: list[str], pointcut: PointcutText) -> str 
     found = f"{view.own}.{asked.text}"
     if found in inputs:
         return found
-    names = _names(inputs)
+    names = [*map(paths.name, inputs)]
     hint = f"its inputs: {', '.join(names) or 'none'}"
     return view.tell(f"{view.kind} has no input {asked.text!r}", asked, hint, near=(asked.text, names))
 
@@ -119,7 +119,7 @@ def _only(
     if not ports:
         return view.tell(f"{kind} has no {direction}", position, f"add '{direction}s: [{name}]' to {kind}")
     message = f"{kind} has {len(ports)} {direction}s, none of them called {name!r}"
-    known = f"its {direction}s: {', '.join(_names(ports))}"
+    known = f"its {direction}s: {', '.join(map(paths.name, ports))}"
     return view.tell(message, position, known, f"call one of them {name!r}" + (f", {hint}" if hint else ""))
 
 
@@ -136,7 +136,7 @@ def _check_types(view: Pointcuts, ports: Iterable[str]) -> None:
 def _is_under_one_director(view: Pointcuts, places: Places, position: Position) -> bool:
     """Whether all places are under the composite's own director, which has one order and one time for them."""
     graph, own = view.graph, view.graph.director_of(view.own)
-    found = {port: graph.director_of(graph.owner(port)) for port in places.ports}
+    found = {port: graph.director_of(paths.parent(port)) for port in places.ports}
     found |= {actor: graph.director_of(actor) for actor in places.actors}
     for source, destination in places.connections:
         edge = next(edge for edge in graph.outgoing(source) if edge.destination == destination)
@@ -219,7 +219,3 @@ def check_nesting(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: P
         hint = f"a token would never leave: attach one of them elsewhere, or exclude it: '!{second}.**'"
         problems.add(message, next(woven.position for woven, _ in models if woven.name == first), hint)
     return not loop
-
-
-def _names(ports: Iterable[str]) -> list[str]:
-    return [port.rpartition(".")[2] for port in ports]

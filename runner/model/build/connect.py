@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
-from epicycle.actors import Actor, FaultError, counted, declared_ports, has_own_ports
+from epicycle.actors import Actor, FaultError, counted, declared_ports, has_own_ports, paths
 
 from ..graph.model_graph import ModelGraph
 from ..graph.nodes import Edge
@@ -88,7 +88,7 @@ def _number(text: str, array: str, value: Callable[[str], object]) -> object:
         return int(text)
     if _EXPRESSION.fullmatch(text):
         return value(text)
-    name = array.rpartition(".")[2]
+    name = paths.name(array)
     forms = ", ".join(f"{name}[{each}]" for each in ("*", "0", "-1", "1..3", "1..", "0, 2", "${...}"))
     raise FaultError(f"{text!r} is not an array index", help=[f"valid forms: {forms}"])
 
@@ -180,7 +180,7 @@ class Wiring:
                 message = f"the model has more than {limit:,} connections"
                 return [*edges, self._problem(message, source.text, RAISE_IT, kind=SIZE)]
             if in_pairs and len(source.ports) != len(target.ports):
-                one, other = self._label(source.text), self._label(target.text)
+                one, other = paths.join(self.path, source.text.text), paths.join(self.path, target.text.text)
                 wrong = self._problem(
                     f"{one} selects {_ports(source)}, but {other} selects {_ports(target)}",
                     target.text,
@@ -193,7 +193,7 @@ class Wiring:
             # '=>' within a group does not connect an actor to itself; '->' still does.
             spare_self = connection.to_all and not source.own and not target.own
             for one, other in pairs:
-                if not (spare_self and one.rpartition(".")[0] == other.rpartition(".")[0]):
+                if not (spare_self and paths.parent(one) == paths.parent(other)):
                     edges.append(Edge(one, other, delay, source.text.position, 0, shared=shared))
         return edges
 
@@ -206,16 +206,14 @@ class Wiring:
                         if text.actor == name:
                             self._has_port(name, member, text.port, wanted, text)
 
-    def _label(self, text: Endpoint) -> str:
-        return f"{self.path}.{text.text}" if self.path else text.text
-
     def _problem(self, message: str, text: Endpoint, *hints: str, kind: Kind = CONNECTION, near: Near = NONE) -> Poison:
         return self.values.problems.add(message, text.position, *hints, scope=self.path, kind=kind, near=near)
 
     def _delay(self, connection: ConnectionText, names: dict[str, object]) -> int | None:
         if connection.delay is None:
             return None
-        label = f"{self._label(connection.sources[0])} -> {self._label(connection.destinations[0])}: delay"
+        ends = (paths.join(self.path, each[0].text) for each in (connection.sources, connection.destinations))
+        label = f"{' -> '.join(ends)}: delay"
         delay = self.values.value(connection.delay, Locals(self.path, names), label)
         return None if delay is POISON else delay
 
@@ -258,7 +256,7 @@ class Wiring:
             message += "go to it and cannot come from it" if ends == "from" else "come from it and cannot go to it"
         elif port in self.members:
             member = self.members[port]
-            message = f"{self._label(text)} is an actor, not a port"
+            message = f"{paths.join(self.path, text.text)} is an actor, not a port"
             index = "[*]" if member.array else ""
             hints = [f"{wanted} ports: {', '.join(f'{port}{index}.{each}' for each in member.ports(wanted)) or 'none'}"]
         else:
@@ -270,7 +268,7 @@ class Wiring:
         self, name: str, index: str | None, member: Member, port: str, text: Endpoint, names: dict[str, object]
     ) -> tuple[list[str], bool] | Poison:
         """The paths of the instances that an endpoint names, and whether it may name several."""
-        label = f"{self.path}.{name}" if self.path else name
+        label = paths.join(self.path, name)
         if not member.array:
             if index is None:
                 return member.paths, False
@@ -300,7 +298,7 @@ class Wiring:
 
     def _has_port(self, name: str, member: Member, port: str, wanted: str, text: Endpoint) -> bool:
         """Check that the child's type has the port, in the direction that the connection needs."""
-        path = f"{self.path}.{name}" if self.path else name
+        path = paths.join(self.path, name)
         valid = member.ports(wanted)
         if port in valid:
             return True

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
-from epicycle.actors import Actor, FaultError, Parameter
+from epicycle.actors import Actor, FaultError, Parameter, paths
 
 from ..catalogue.dialect import Dialect
 from ..catalogue.port_types import read_type, token_types
@@ -102,7 +102,7 @@ class Instantiator:
         """Make the actors of a composite, or of the model, and connect them; its aspects are noted."""
         members: dict[str, Member] = {}
         for name, part in composite.actors.items():
-            full = f"{path}.{name}" if path else name
+            full = paths.join(path, name)
             member = self.instances(full, part, names, within)
             if member is None:
                 self.graph.gaps[full] = Gap()
@@ -111,7 +111,7 @@ class Instantiator:
         others = [
             (name, member)
             for name, part in composite.actors.items()
-            for member in self._others(f"{path}.{name}" if path else name, composite, part, names, within)
+            for member in self._others(paths.join(path, name), composite, part, names, within)
         ]
         for name, part in composite.aspects.items():
             if part.type.text in self.known.composites and (
@@ -360,7 +360,7 @@ class Instantiator:
         self, path: str, composite: CompositeText, part: PartText, names: Names, within: tuple[str, ...]
     ) -> Member | None:
         """Make the composite of an aspect; if it is not enabled, only to check it."""
-        full, graph = f"{path}.{part.name}" if path else part.name, self.graph
+        full, graph = paths.join(path, part.name), self.graph
         is_port = part.name in composite.inputs or part.name in composite.outputs
         if is_port or part.name in composite.actors or full in graph.components:
             clash = "a port" if is_port else "an actor"

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
-from epicycle.actors import Actor, InputPort, OutputPort, ParameterError
+from epicycle.actors import Actor, InputPort, OutputPort, ParameterError, paths
 from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
 from ..graph.model_graph import ModelGraph
@@ -96,7 +96,6 @@ class Named:
     def __init__(self, graph: ModelGraph, scope: str, position: Position, problems: Problems) -> None:
         self._graph = graph
         self._scope = scope
-        self._start = f"{scope}." if scope else ""
         self._position = position
         self._problems = problems
 
@@ -128,7 +127,7 @@ class Named:
                 if isinstance(end, str):
                     found.append(replace(PointcutText.of(self._text(end)), request=asked))
                 elif (path := self._place(end, cls)) is not None:
-                    here = path.removeprefix(self._start)
+                    here = paths.relative(path, self._scope)
                     found.append(PointcutText(here, within(self._position, here), request=asked))
         return found
 
@@ -155,7 +154,7 @@ class Named:
         scope, _, actor = owner.rpartition(".")
         if self._scope in (owner, scope):
             actor, bracket, index = ("" if owner == self._scope else actor).partition("[")
-            text = path.removeprefix(self._start)
+            text = paths.relative(path, self._scope)
             return Endpoint(text, within(self._position, text), actor, index[:-1] if bracket else None, name)
         there = f"in {scope}" if scope else "at the top of the model"
         hint = f"connect it {there}, where {owner} is; ports of composites lead in and out"
@@ -176,7 +175,7 @@ class Named:
         graph = self._graph
         if isinstance(port, (Actor, Holder)):
             kind = "an actor" if isinstance(port, Actor) else "a composite"
-            ports = [each for each in graph.ports if graph.owner(each) == port.path]
+            ports = [each for each in graph.ports if paths.parent(each) == port.path]
             self._tell(f"{port.path} is {kind}, not a port", f"name one of its ports: {', '.join(ports) or 'none'}")
             return None
         if not isinstance(port, (InputPort, OutputPort, CompositePort)):

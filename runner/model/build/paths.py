@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from epicycle.actors import Fault, FaultError, declared_parameters, did_you_mean
+from epicycle.actors import Fault, FaultError, declared_parameters, did_you_mean, paths
 from epicycle.actors.expression import PortFormula
 from epicycle.aspects import (
     Aspect,
@@ -57,7 +57,7 @@ class Paths:
     @cached_property
     def owners(self) -> PathIndex:
         """All composites and actors, including those that could not be made."""
-        unmade = sorted(set(map(self.graph.owner, self.graph.fed)))
+        unmade = sorted(set(map(paths.parent, self.graph.fed)))
         return self._index(dict.fromkeys((*self.graph.composites, *self.graph.actors, *unmade)))
 
 
@@ -80,7 +80,7 @@ class View:
         return self.paths.ports
 
     def _full(self, text: str) -> str:
-        return f"{self.scope}.{text}" if self.scope else text
+        return paths.join(self.scope, text)
 
     def tell(
         self,

@@ -17,6 +17,7 @@ from epicycle.actors import (
     declared_parameters,
     did_you_mean,
     nearest,
+    paths,
     unknown_parameter,
     variants,
 )
@@ -74,7 +75,7 @@ class ParameterResolver(Values):
             given, valid, lambda key: f"{kind} has no parameter {key!r}{did_you_mean(key, valid)}", path
         )
         for name, declared in valid.items():
-            full = f"{path}.{name}" if path else name
+            full = paths.join(path, name)
             node, local = declared.value, Locals(path, names, valid.keys())
             if name in given:
                 node, local = given[name].value, Locals(path, outer)
@@ -207,7 +208,7 @@ class ParameterResolver(Values):
     def _add_unused(self, setting: Setting) -> None:
         known = list(dict.fromkeys(_in_terms_of(setting.path, path) for path in self._settable))
         owner, _, last = setting.path.rpartition(".")
-        beside = [path.rpartition(".")[2] for path in known if path.rpartition(".")[0] == owner]
+        beside = [paths.name(path) for path in known if paths.parent(path) == owner]
         if last in _NO_PARAMETERS and last not in beside:
             message = f"{setting.path!r} matches no parameter"
             self.problems.add(message, setting.position, _NO_PARAMETERS[last], kind=FROM_OUTSIDE)
@@ -216,7 +217,7 @@ class ParameterResolver(Values):
         alike = [path for path in known if _INDEX.sub("", path) == _INDEX.sub("", setting.path)]
         meant, name = nearest(setting.path, alike), nearest(last, beside)
         if meant is None and name is not None:
-            meant = f"{owner}.{name}" if owner else name
+            meant = paths.join(owner, name)
         meant = meant or nearest(setting.path, known)
         near = "" if meant is None else f", did you mean {meant!r}?"
         valid = (f"valid parameters {f'of {owner}' if owner else 'here'}: {', '.join(beside)}",) if beside else ()

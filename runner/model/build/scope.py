@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar, overload
 
-from epicycle.actors import Actor, accepts, did_you_mean, type_name
+from epicycle.actors import Actor, accepts, did_you_mean, paths, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
 
 from ..graph.model_graph import ModelGraph
@@ -57,12 +57,12 @@ class _Members(Mapping[str, Member]):
         self._parts = graph.parts(path)
 
     def __getitem__(self, name: str) -> Member:
-        graph, paths = self._graph, self._parts[name]
-        first, is_array = paths[0], paths[0].endswith("]")
+        graph, instances = self._graph, self._parts[name]
+        first, is_array = instances[0], instances[0].endswith("]")
         if first in graph.actors:
-            return member_of_actors(type(graph.actors[first]), paths, is_array, len(paths), graph)
-        inputs, outputs = graph.borders(first)
-        return Member(_label(graph, first), paths, is_array, len(paths), _names(inputs), _names(outputs))
+            return member_of_actors(type(graph.actors[first]), instances, is_array, len(instances), graph)
+        inputs, outputs = ([*map(paths.name, ports)] for ports in graph.borders(first))
+        return Member(_label(graph, first), instances, is_array, len(instances), inputs, outputs)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._parts)
@@ -169,7 +169,7 @@ class Scope(Holder):
         instances = parts.get(name.partition("[")[0], [])
         with raising() as problems:
             if full not in instances:
-                known = [path[len(self._full("")) :] for each in parts.values() for path in each]
+                known = [paths.relative(path, self.path) for each in parts.values() for path in each]
                 hint = f"valid actors: {', '.join(known) or 'none'}"
                 problems.add(f"{self._name} has no actor {name!r}{did_you_mean(name, known)}", position, hint)
             elif full != instances[-1]:
@@ -226,7 +226,7 @@ class Scope(Holder):
         return full
 
     def _full(self, name: str) -> str:
-        return f"{self.path}.{name}" if self.path else name
+        return paths.join(self.path, name)
 
     # -- connections ----------------------------------------------------------------------------------------------
 
@@ -268,7 +268,8 @@ class Scope(Holder):
         connection = Named(graph, self.path, position, problems).connection(source, destination, delay, self._name)
         if connection is None:
             return []
-        members, (inputs, outputs) = _Members(graph, self.path), map(_names, graph.borders(self.path))
+        members, borders = _Members(graph, self.path), graph.borders(self.path)
+        inputs, outputs = ([*map(paths.name, ports)] for ports in borders)
         wiring = Wiring(graph, Values(problems), self.path, self._name, inputs, outputs, members.keys(), members)
         return [edge for edge in wiring.resolve(connection, {}) if edge]
 
@@ -392,7 +393,9 @@ class Composite(Scope):
                 problems.add(f"{full!r} is the name of both an actor and a port", position, "rename one")
 
     def __repr__(self) -> str:
-        inputs, outputs = (", ".join(_names(ports)) or "none" for ports in self._model.graph.borders(self.path))
+        inputs, outputs = (
+            ", ".join(map(paths.name, ports)) or "none" for ports in self._model.graph.borders(self.path)
+        )
         return f"<Composite {self.path}: inputs {inputs}; outputs {outputs}>"
 
 
@@ -400,7 +403,3 @@ def _label(graph: ModelGraph, composite: str) -> str:
     """The name of a composite in messages: its class, if it has one."""
     kind = graph.components[composite].kind
     return composite if kind == OF_NO_CLASS else kind
-
-
-def _names(paths: Iterable[str]) -> list[str]:
-    return [path.rpartition(".")[2] for path in paths]

@@ -11,11 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from epicycle.actors import declared_parameters, nearest
+from epicycle.actors import declared_parameters, nearest, paths
 from epicycle.aspects import Aspect
 
 from ..graph.acts import connection_place
-from ..graph.nodes import is_within
 from ..graph.woven import Places, WovenAspect
 from ..language.places import PointcutText
 from ..text.kinds import NO_PLACE
@@ -86,7 +85,7 @@ class Pointcuts(View):
         return left
 
     def _is_own(self, path: str) -> bool:
-        return bool(self.own) and is_within(path, self.own)
+        return bool(self.own) and paths.is_within(path, self.own)
 
     def _ports_of(self, pointcut: PointcutText) -> list[str] | Poison:
         """The ports that the aspect can attach to, of those that one pointcut selects."""
@@ -181,11 +180,11 @@ class Pointcuts(View):
 
     def _chosen(self, pointcut: PointcutText) -> list[str] | Poison:
         """The ports of the actors and composites of a type, or with a tag."""
-        graph, owners = self.graph, self._chosen_owners(pointcut)
+        owners = self._chosen_owners(pointcut)
         if owners is POISON:
             return POISON
         of_owners = dict.fromkeys(path for owner in owners for path in self.ports.inside(owner))
-        ports = self.ports.in_order(path for path in of_owners if graph.owner(path) in owners)
+        ports = self.ports.in_order(path for path in of_owners if paths.parent(path) in owners)
         if pointcut.port is None:
             found = [path for path in ports if self._fits(path)]
             if not found and not any(path in self.graph.gaps for path in owners):
@@ -193,9 +192,9 @@ class Pointcuts(View):
                 where = pointcut.type or pointcut.tag
                 return self.tell(f"{self.kind} attaches to {wanting} ports, but no {_asked(pointcut)} has one", where)
             return found
-        found = [path for path in ports if path.rpartition(".")[2] == pointcut.port.text]
+        found = [path for path in ports if paths.name(path) == pointcut.port.text]
         if not found:
-            names = sorted({path.rpartition(".")[2] for path in ports})
+            names = sorted({*map(paths.name, ports)})
             hint = f"their ports: {', '.join(names) or 'none'}"
             message, near = f"no {_asked(pointcut)} has a port {pointcut.port.text!r}", (pointcut.port.text, names)
             return self.tell(message, pointcut.port, hint, kind=NO_PLACE, near=near)
@@ -279,8 +278,7 @@ class Pointcuts(View):
         chosen = {each for unit in by_unit for each in (unit, *actors.inside(unit)) if each in actors}
         attached: dict[str, str] = {}
         for actor in actors.in_order(each for each in chosen if not self._is_own(each)):
-            parts = actor.split(".")
-            around = [".".join(parts[:length]) for length in range(1, len(parts) + 1)]
+            around = [*reversed(paths.ancestors(actor)), actor]
             unit = next((path for path in around if path in by_unit), None)
             if unit is not None and not spared.intersection(around):
                 attached[actor] = unit
@@ -296,7 +294,7 @@ class Pointcuts(View):
             owners = self._chosen_owners(pointcut)
             return POISON if owners is POISON else sorted(owners)
         if pointcut.ends is not None:
-            receiver = pointcut.ends[1].rpartition(".")[0]
+            receiver = paths.parent(pointcut.ends[1])
             hint = f"write {receiver!r} for the receiving actor"
             return self.tell(f"{name} attaches to actors, not to connections", pointcut, hint)
         full = self._full(text)
@@ -311,7 +309,7 @@ class Pointcuts(View):
         if ports and "." in text:
             hint = f"write {text.rpartition('.')[0]!r}, without the port"
             return self.tell(f"{name} attaches to actors, but {ports[0]} is a port", pointcut, hint)
-        inside = (path.removeprefix(self._full("")) for path in index.inside(self.scope))
+        inside = (paths.relative(path, self.scope) for path in index.inside(self.scope))
         near = sorted(path for path in inside if path.count(".") == text.count("."))
         hint = f"actors and composites at this depth: {', '.join(near) or 'none'}"
         around = index.near(text, self.scope)

@@ -7,7 +7,7 @@ from collections.abc import Mapping as AnyMapping
 from dataclasses import replace
 from functools import partial
 
-from epicycle.actors import Actor, EpicycleError, declared_parameters, did_you_mean
+from epicycle.actors import Actor, EpicycleError, declared_parameters, did_you_mean, paths
 from epicycle.aspects import (
     Aspect,
     CompositeAspect,
@@ -41,11 +41,11 @@ from .weave import Pointcuts
 def weave_all(made: Instantiator) -> list[WovenAspect]:
     """Attach all aspects, now that all ports exist, in the order in which tokens meet them."""
     with made.problems.looking_for(ASPECT):
-        graph, problems, paths, found = made.graph, made.problems, Paths(made.graph), list[WovenAspect]()
+        graph, problems, indexed, found = made.graph, made.problems, Paths(made.graph), list[WovenAspect]()
         for scope, part, names in made.aspects:
-            name = f"{scope}.{part.name}" if scope else part.name
+            name = paths.join(scope, part.name)
             try:
-                if (woven := _declared(made, paths, name, scope, part, names)) is not None:
+                if (woven := _declared(made, indexed, name, scope, part, names)) is not None:
                     found.append(woven)
             except TooManyError as error:
                 problems.stop(f"aspect {name}: {error}", part.position, RAISE_IT)

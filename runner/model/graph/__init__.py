@@ -1,7 +1,6 @@
 """The frozen model: actors, composites, ports and connections, aspects at their places, what is watched, and ranks."""
 
 from .model_graph import ModelGraph
-from .nodes import is_within
 from .ranks import steps
 
-__all__ = ["ModelGraph", "is_within", "steps"]  # what directors of other packages need
+__all__ = ["ModelGraph", "steps"]  # what directors of other packages need

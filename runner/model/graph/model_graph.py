@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from epicycle.actors import Actor, InputPort, OutputPort, declared_ports, has_own_ports
+from epicycle.actors import Actor, InputPort, OutputPort, declared_ports, has_own_ports, paths
 from epicycle.aspects import Request
 
 from ..catalogue.dialect import Dialect
@@ -18,7 +18,7 @@ from ..text.limits import NORMAL, Limits
 from ..text.patterns import could_be_within
 from ..text.problems import Position
 from .clock import Clock
-from .nodes import Component, Detour, Domain, Edge, Gap, PortNode, Wire, is_within
+from .nodes import Component, Detour, Domain, Edge, Gap, PortNode, Wire
 
 
 class ModelGraph:
@@ -79,8 +79,8 @@ class ModelGraph:
         """Take in a part that was made for this graph."""
         self._check_open()
         self.domains[director].members += part.domains.pop("").members
-        for paths in part.components.pop("").parts.values():
-            for path in paths:
+        for instances in part.components.pop("").parts.values():
+            for path in instances:
                 self._enrol(path)
         self.ports |= part.ports
         self.actors |= part.actors
@@ -168,13 +168,13 @@ class ModelGraph:
         """Add a port of a composite; tokens only pass through it, and have the ``type`` if there is one."""
         self._check_open()
         self.ports[path] = PortNode(None, direction, type, declared)
-        self.components[self.owner(path)].borders[direction == "output"].append(path)
+        self.components[paths.parent(path)].borders[direction == "output"].append(path)
 
     def open_requests(self, path: str) -> None:
         """Make an input of a composite the place where an aspect's requests come in: tokens start there."""
         self._check_open()
         port = OutputPort(Request, multi=True)
-        port.name, port.path = path.rpartition(".")[2], path
+        port.name, port.path = paths.name(path), path
         self.ports[path].port = port
 
     def connect(
@@ -209,7 +209,7 @@ class ModelGraph:
     def remove(self, path: str) -> None:
         """Remove an actor, or a composite and its contents, with their connections."""
         self._check_open()
-        for port in [each for each in self.ports if is_within(each, path)]:
+        for port in [each for each in self.ports if paths.is_within(each, path)]:
             for edge in {*self.incoming(port), *self.outgoing(port)}:
                 self.disconnect(edge)
             del self.ports[port]
@@ -218,13 +218,13 @@ class ModelGraph:
         siblings[name.partition("[")[0]].remove(path)
         if not siblings[name.partition("[")[0]]:
             del siblings[name.partition("[")[0]]
-        for gone in [each for each in self.components if is_within(each, path)]:
+        for gone in [each for each in self.components if paths.is_within(each, path)]:
             del self.components[gone]
             self.domains.pop(gone, None)
             if (actor := self.actors.pop(gone, None)) is not None:
                 actor.is_part = False
         for domain in self.domains.values():
-            domain.members[:] = [each for each in domain.members if not is_within(each, path)]
+            domain.members[:] = [each for each in domain.members if not paths.is_within(each, path)]
 
     def direction(self, path: str) -> str:
         """``input`` or ``output``."""
@@ -235,15 +235,11 @@ class ModelGraph:
         node = self.ports[path]
         return node.type if node.port is None else node.port.type
 
-    def owner(self, port: str) -> str:
-        """The actor or composite that a port belongs to."""
-        return port.rpartition(".")[0]
-
     def director_of(self, path: str) -> str:
         """The innermost composite with a director that contains an actor or composite; "" is the model itself."""
-        around = path.rpartition(".")[0]
+        around = paths.parent(path)
         while around not in self.domains:
-            around = around.rpartition(".")[0]
+            around = paths.parent(around)
         return around
 
     def refinement_of(self, path: str) -> str:
@@ -257,7 +253,7 @@ class ModelGraph:
 
     def director_over(self, edge: Edge) -> str:
         """The director whose time applies to a connection: that of the composite that declares it."""
-        owner = self.owner(edge.source)
+        owner = paths.parent(edge.source)
         # A connection from a composite's own input is declared inside that composite.
         inside = owner in self.domains and self.direction(edge.source) == "input"
         return owner if inside else self.director_of(owner)
@@ -269,7 +265,7 @@ class ModelGraph:
 
     def is_end(self, path: str) -> bool:
         """Whether a port belongs to something that fires, and tokens do not only pass through it."""
-        owner = self.owner(path)
+        owner = paths.parent(path)
         return owner in self.domains or owner in self.actors
 
     def outgoing(self, path: str) -> Sequence[Edge]:
@@ -321,7 +317,7 @@ class ModelGraph:
             return edge.shared
         for place in range(len(edges), 0, -1):
             far = edges[place - 1].destination
-            domain = self.domains.get(self.owner(far))
+            domain = self.domains.get(paths.parent(far))
             if domain is not None and domain.machine and domain.dialect.is_strict and self.direction(far) == "output":
                 return edges[place:]
         return edges

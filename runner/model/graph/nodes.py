@@ -100,8 +100,3 @@ class Gap:
     kinds: frozenset[str] = frozenset()
     is_open: bool = True
     is_empty: bool = False
-
-
-def is_within(path: str, outer: str) -> bool:
-    """Whether a path is that of a part or of something in it."""
-    return path == outer or path.startswith(f"{outer}.")

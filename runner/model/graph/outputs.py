@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from epicycle.actors import paths
 from epicycle.actors.expression import Formula
 from epicycle.aspects import Reading
 
@@ -12,7 +13,6 @@ from ..catalogue.metrics import MetricSpec
 from ..temporal import TINY, Property, Requirement
 from ..text.patterns import folded
 from ..text.problems import Position
-from .nodes import is_within
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Metric:
 
     def without(self, path: str) -> Metric:
         """The metric after the removal of a part of the model that it may have watched."""
-        return replace(self, ports=[port for port in self.ports if not is_within(port, path)])
+        return replace(self, ports=[port for port in self.ports if not paths.is_within(port, path)])
 
     @property
     def is_measured(self) -> bool:
@@ -82,7 +82,7 @@ class Monitor:
 
     def without(self, path: str) -> Monitor | None:
         """The monitor after the removal of a part of the model that it may have watched; None if nothing is left."""
-        parts = [each for each in self.parts if not any(is_within(port, path) for port in each.ports)]
+        parts = [each for each in self.parts if not any(paths.is_within(port, path) for port in each.ports)]
         return replace(self, parts=parts) if parts or not self.parts else None
 
     def in_unit(self, margin: float) -> float:
@@ -125,8 +125,8 @@ class OutputSpec:
         gone = {each.name for each, kept in zip(self.monitors, left, strict=True) if kept is None}
         return replace(
             self,
-            recorded=[port for port in self.recorded if not is_within(port, path)],
-            stop_ports=[port for port in self.stop_ports if not is_within(port, path)],
+            recorded=[port for port in self.recorded if not paths.is_within(port, path)],
+            stop_ports=[port for port in self.stop_ports if not paths.is_within(port, path)],
             metrics=[metric.without(path) for metric in self.metrics if metric.monitor not in gone],
             monitors=[each for each in left if each is not None],
         )

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import TypeAlias
 
+from epicycle.actors import paths
+
 from .digraph import in_order
 from .model_graph import ModelGraph
 from .nodes import Edge
@@ -126,7 +128,7 @@ def _acts(graph: ModelGraph, director: str, region: Region, port: str) -> bool:
         for far in region[waiting.pop()].keys() - seen:
             if not graph.is_end(far):
                 waiting.append(far)
-            elif far in borders or region[far] or not ports_of(graph, graph.owner(far))[1]:
+            elif far in borders or region[far] or not ports_of(graph, paths.parent(far))[1]:
                 return True
             seen.add(far)
     return False
@@ -176,7 +178,7 @@ def _turns(graph: ModelGraph, director: str, depth: dict[str, int]) -> Iterator[
             found.setdefault(depth[port], []).append(port)
         turns += [((deep, graph.components[member].priority), paths) for deep, paths in found.items()]
     # The sort is stable: the order of declaration decides ties.
-    for level, paths in sorted(turns, key=lambda turn: turn[0]):
-        yield Step(paths, level)
+    for level, fired in sorted(turns, key=lambda turn: turn[0]):
+        yield Step(fired, level)
     if machine:
         yield Step([machine, *ports_of(graph, machine)[0]])

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from epicycle.actors import counted
+from epicycle.actors import counted, paths
 from epicycle.actors.expression import PortFormula
 from epicycle.aspects import Aspect, ExecutionAspect, FiringTime, Reading, Selection
 
 from ..text.problems import Position, Problems
 from .acts import connection_place
-from .nodes import is_within
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class AspectModel:
         """What a model file would declare for a place: the request port, if there are several, and the time."""
         said: dict[str, object] = {}
         if len(set(self.requests.values())) > 1:
-            said["request"] = self.requests[place].rpartition(".")[2]
+            said["request"] = paths.name(self.requests[place])
         if place in self.times:
             said["time"] = self.times[place]
         return said
@@ -80,10 +79,10 @@ class WovenAspect(Places):
         """The aspect after the removal of a part of the model that it may have been attached to."""
         return replace(
             self,
-            ports=[port for port in self.ports if not is_within(port, path)],
-            actors={actor: unit for actor, unit in self.actors.items() if not is_within(actor, path)},
-            parameters=[each for each in self.parameters if not is_within(each, path)],
-            connections=[ends for ends in self.connections if not any(is_within(end, path) for end in ends)],
+            ports=[port for port in self.ports if not paths.is_within(port, path)],
+            actors={actor: unit for actor, unit in self.actors.items() if not paths.is_within(actor, path)},
+            parameters=[each for each in self.parameters if not paths.is_within(each, path)],
+            connections=[ends for ends in self.connections if not any(paths.is_within(end, path) for end in ends)],
         )
 
     @property

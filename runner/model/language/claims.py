@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from epicycle.actors import did_you_mean
 
+from ...support.shown import listed
 from ..text.problems import Position, Problems
 from ..text.reading import Text
 from .dimensions import Factor
@@ -150,9 +151,5 @@ def shown_level(value: Factor) -> str:
 
 
 def _shown(selection: Selection, words: Callable[[str], str]) -> str:
-    parts = []
-    for factor, levels in selection.items():
-        shown = [shown_level(each) for each in levels]
-        listed = shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} or {shown[-1]}"
-        parts.append(f"{words(factor)}={listed}")
+    parts = (f"{words(name)}={listed([*map(shown_level, levels)], 'or')}" for name, levels in selection.items())
     return " and ".join(parts)

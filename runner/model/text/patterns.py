@@ -6,10 +6,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator
 from functools import cached_property, lru_cache
 
-from epicycle.actors import FaultError, nearest
+from epicycle.actors import FaultError, nearest, paths
 
 from .limits import NORMAL, Limits
 
@@ -147,7 +147,7 @@ class PathIndex:
             return [pattern] if pattern in self._place else []
         # At the first wildcard, `name[*]` still gives the name.
         fixed = pattern.partition("*")[0].rstrip("[.")
-        candidates: Sequence[str] = self._within.get(fixed, ()) if fixed else self._order
+        candidates: Collection[str] = self._within.get(fixed, ()) if fixed else self._place.keys()
         # Selecting by the names in a pattern pays if there are many patterns.
         if self._compared > _MANY * len(self._place):
             others = [self._having.get(name, ()) for name in names_asked(pattern)]
@@ -163,22 +163,18 @@ class PathIndex:
 
     def near(self, pattern: str, scope: str = "", fits: Callable[[str], bool] = _always) -> tuple[str, Iterable[str]]:
         """A pattern without matches, and the paths that fit, of which it may mean one: for ``Problems.add``."""
-        near: Iterable[str] = (path for path in self.inside(scope) if fits(path))
-        start = f"{scope}." if scope else ""
-        near = (path.removeprefix(start) for path in near)
+        near: Iterable[str] = (paths.relative(path, scope) for path in self.inside(scope) if fits(path))
         if "[*]" in pattern:
             near = dict.fromkeys(map(in_general, near))
         return pattern, near
 
     def advice(self, pattern: str, scope: str = "", fits: Callable[[str], bool] = _always) -> tuple[str, ...]:
         """What to write instead of a pattern without matches: the ports at the place that it names."""
-        start = f"{scope}." if scope else ""
-        owner = pattern.rpartition(".")[0]
-        if len(start) + len(pattern) + 2 > MAX_PATTERN:
+        if len(paths.join(scope, pattern)) + 2 > MAX_PATTERN:
             return ()
-        for holder in (pattern, owner):
-            ports = [path for path in self.select(f"{start}{holder}.*") if fits(path)] if holder else []
-            names = list(dict.fromkeys(path.rpartition(".")[2] for path in ports))
+        for holder in (pattern, paths.parent(pattern)):
+            ports = [path for path in self.select(paths.join(scope, f"{holder}.*")) if fits(path)] if holder else []
+            names = list(dict.fromkeys(map(paths.name, ports)))
             if names and holder == pattern:
                 written = ", ".join(f"{pattern}.{name}" for name in names)
                 return (f"that is an actor, not a port: write {written}",)
@@ -186,7 +182,7 @@ class PathIndex:
                 return (f"valid ports of {holder}: {', '.join(names)}",)
         if nearest(*self.near(pattern, scope, fits)):
             return ()
-        firsts = (path.removeprefix(start).partition(".")[0] for path in self.inside(scope) if fits(path))
+        firsts = (paths.relative(path, scope).partition(".")[0] for path in self.inside(scope) if fits(path))
         holders = list(dict.fromkeys(map(in_general, firsts)))
         if not holders:
             return ("there is no suitable port",)
@@ -200,10 +196,6 @@ class PathIndex:
     def inside(self, scope: str) -> Collection[str]:
         """The paths within a composite; all of them if it is the model."""
         return self._within.get(scope, ()) if scope else self._place.keys()
-
-    @cached_property
-    def _order(self) -> list[str]:
-        return list(self._place)
 
     @cached_property
     def _having(self) -> dict[str, list[str]]:
