@@ -159,13 +159,8 @@ def pass_recording(
         try:
             return _pass(source, recording, target, weave, seed, None)  # of bytes that nobody reads, which is faster
         except ActorError as error:
-            if isinstance(error.__cause__, RecordingError):
-                raise error.__cause__ from None
             codec = _codec(recording, error)
-        try:
-            return _pass(source, recording, target, weave, seed, codec)
-        except ActorError as error:
-            raise (error.__cause__ if isinstance(error.__cause__, RecordingError) else error) from None
+        return _pass(source, recording, target, weave, seed, codec)
 
 
 def _codec(recording: Recording, error: ActorError) -> Codec:
@@ -207,7 +202,10 @@ def _pass(
         left_out = weave(model, channels)
         reached = {path for woven in model.aspects for path in woven.ports}
         tokens.are_read = {number for number, each in channels.items() if not reached.isdisjoint(each.paths)}
-        results = Simulation(model, seed=seed).run()
+        try:
+            results = Simulation(model, seed=seed).run()
+        except ActorError as error:
+            raise (error.__cause__ if isinstance(error.__cause__, RecordingError) else error) from None
         writing.finish()
     return Disturbed(source, target, came, delivered, results.aspects, left_out, seed)
 

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
+from statistics import pstdev
 from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, read_table, to_nanoseconds, to_seconds
@@ -173,7 +174,9 @@ class _Task(Worker):
         if not self.signals:
             raise EpicycleError("there is nothing to match\n   help: add --match server.size=measured.csv")
         self.measured = [value for _, _, values in self.signals for value in values]
-        self.scales = [_deviation(values) for _, _, values in self.signals for _ in values]
+        # By which residuals of signals in different units are made alike.
+        scales = [pstdev(values) or 1.0 for _, _, values in self.signals]
+        self.scales = [scale for scale, (_, times, _) in zip(scales, self.signals, strict=True) for _ in times]
         self.seed = self.model.output.seed if spec.seed is None else spec.seed
         self.files = goal.files
 
@@ -292,12 +295,6 @@ def _cell(path: Path, row: int, column: str, cell: Any) -> float:
             return number
     shown = "empty" if cell is None or cell == "" else repr(cell)
     raise EpicycleError(f"{path}: row {row}: {column} is {shown}, expected a number")
-
-
-def _deviation(values: Sequence[float]) -> float:
-    """By which residuals of signals in different units are made alike; 1 if all values are the same."""
-    middle = math.fsum(values) / len(values)
-    return math.sqrt(math.fsum((each - middle) * (each - middle) for each in values) / len(values)) or 1.0
 
 
 def _sampled(signal: Any, name: str, times: Sequence[int], end: float, linear: bool, key: str) -> list[float]:

@@ -21,6 +21,7 @@ from ..support.tables import Table
 from .answer import Answer
 
 _ENOUGH = 10  # residuals, of which a correlation can be told
+_SMALL = 1e-6  # of a signal: residuals that rounding and the end of the search leave
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,8 @@ class Calibration(Answer):
             yield f"The data hardly tell {one} and {other} apart (correlation {likeness:.2f})."
         for match in self.matches:
             noise = 2.0 / math.sqrt(len(match.times))
-            if len(match.times) >= _ENOUGH and abs(match.correlation) > noise and _is_rough(match):
+            is_rough = match.rms > _SMALL * max(map(abs, match.measured))
+            if len(match.times) >= _ENOUGH and abs(match.correlation) > noise and is_rough:
                 yield (
                     f"The residuals of {match.signal} are no independent errors (correlation of neighbours "
                     f"{match.correlation:.2f}): something is not in the model, and the intervals are too narrow."
@@ -155,8 +157,3 @@ def _value(each: Fitted) -> str:
         return f"{each.value:.4g}{unit}"
     width = each.high - each.low
     return f"{rounded(each.value, width)} ± {rounded(width / 2, width)}{unit}" if width else f"{each.value:.9g}{unit}"
-
-
-def _is_rough(each: Matched) -> bool:
-    """Whether the residuals are more than what rounding and the end of the search leave."""
-    return each.rms > 1e-6 * max(map(abs, each.measured))

@@ -115,14 +115,12 @@ class Evaluator:
                 self._go_ahead()
 
     def _go_ahead(self) -> None:
-        while (threads := self._threads) is not None and self._waiting() < self._jobs:
-            if (following := next(self._expected, None)) is None:
+        while (threads := self._threads) is not None:
+            waiting = [each for each in self._begun.values() if not each.done()]
+            if len(waiting) >= self._jobs or (following := next(self._expected, None)) is None:
                 return
             if following[0] not in self._made:
                 self._begin_with(threads, *following)
-
-    def _waiting(self) -> int:
-        return len([each for each in self._begun.values() if not each.done()])
 
 
 def _worker_of(recipe: Recipe, kind: Callable[..., Worker], *others: object) -> Worker:

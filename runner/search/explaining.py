@@ -286,7 +286,7 @@ def _steps(graph: ModelGraph, ports: Collection[str], ours: Sends, theirs: Sends
     differing = _differing(ours, theirs)
     found: list[Step] = []
     sources = {source.path for port in ports for source in graph.source_of(port)}
-    while sources := {each for each in sources if each in differing and differing[each].port not in _ports(found)}:
+    while sources := (sources & differing.keys()) - {each.port for each in found}:
         step = min((differing[each] for each in sources), key=lambda each: (each.time, each.port))
         if found and step.time > found[-1].time:
             break
@@ -294,10 +294,6 @@ def _steps(graph: ModelGraph, ports: Collection[str], ours: Sends, theirs: Sends
         inputs = graph.actors[paths.parent(step.port)].inputs.values()
         sources = {wire.source.path for port in inputs for wire in graph.wires_to(port)}
     return found[::-1]
-
-
-def _ports(steps: Collection[Step]) -> set[str]:
-    return {each.port for each in steps}
 
 
 def _differing(ours: Sends, theirs: Sends) -> dict[str, Step]:

@@ -104,11 +104,10 @@ class Explanation(Answer):
 
     def _sentences(self) -> list[str]:
         broken = f"{self.monitor} ({self.source}) is broken" + _at(self.verdict_of_set)
+        chosen = listed(self.only, "or")
         if not self.effects:
             if self.others:
-                said = [
-                    f"{broken} without any fault of {_either(self.only)}: other aspects or the model itself break it."
-                ]
+                said = [f"{broken} without any fault of {chosen}: other aspects or the model itself break it."]
             else:
                 said = [f"{broken} without any fault of an aspect: the model breaks it by itself."]
             return [*said, *self._also()]
@@ -116,7 +115,7 @@ class Explanation(Answer):
             broken += f" (in the whole run{_at(self.verdict)})"
         number = len(self.effects)
         what = "; ".join(f"{text} at {times}" for text, times in _grouped(self.effects))
-        of_them = f" of {_either(self.only)}" if self.only else ""
+        of_them = f" of {chosen}" if self.only else ""
         said = [
             f"{counted(number, 'fault')} of {self.acts:,}{of_them} {'suffices' if number == 1 else 'suffice'}: {what}.",
             f"With {'it' if number == 1 else 'these'} alone, {broken}.",
@@ -229,10 +228,6 @@ def _before(effect: Effect) -> str:
     elif effect.whole.token != effect.act.token:
         told.append("another token")
     return ", ".join(told)
-
-
-def _either(names: Sequence[str]) -> str:
-    return listed(names, "or")
 
 
 def _when(act: Act) -> str:

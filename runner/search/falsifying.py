@@ -26,11 +26,10 @@ from ..support.bars import Show, unseen
 from ..support.shown import short
 from ..support.tables import Table
 from .answer import StudyAnswer, listed
-from .faults import FaultSpace
 from .growing import Growing, study_of
 from .monitored import AD_HOC, monitors_named, property_of, with_monitors
-from .proposals import BATCH, SPREAD, Point, proposals
-from .space import Interval, SearchSpec, Space, as_set, read_space, text_of
+from .proposals import BATCH, SPREAD, Point
+from .space import FaultSpace, Interval, SearchSpec, Space, as_set, read_space, text_of
 from .spec import MAX_RUNS, Break, results_folder
 
 FILE = Path("falsify")  # what the study of a search has for a file, so that paths are relative to the working directory
@@ -73,7 +72,7 @@ class Falsification(StudyAnswer):
     goal: Break
     model: str
     monitors: dict[str, str]  # the property of each
-    space: Space | FaultSpace
+    space: Space
     guided: bool
     runs: list[Run] = field(default_factory=list)
     broken: Run | None = None  # the first run that breaks the property
@@ -315,12 +314,8 @@ class _Searching:
             keys["monitors"] = {AD_HOC: goal.monitor}
         keys["metrics"] = metrics
         self.growing = Growing(study_of(spec, keys, FILE), keys, searched, runs=goal.runs, command=spec.continued_by)
-        self.found = Falsification(spec, goal, model.name, monitors, searched, space.is_guided)
-        self._proposals = (
-            searched.proposals(self._seed)
-            if isinstance(searched, FaultSpace)
-            else proposals(space.widths, self._seed, space.is_guided)
-        )
+        self.found = Falsification(spec, goal, model.name, monitors, searched, searched.is_guided)
+        self._proposals = searched.proposals(self._seed)
         self._latest: list[float | None] | None = None
 
     def _faults(self, model: Model) -> FaultSpace:

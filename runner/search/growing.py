@@ -22,7 +22,6 @@ from ..study.run.processes import Processes
 from ..study.run.runner import Runner
 from ..study.run.store import BEST_FIRST, Row, prepare, write
 from ..study.session import available_cores, manifest_of
-from .faults import FaultSpace
 from .proposals import Point
 from .space import SearchSpec, Space, said
 
@@ -66,7 +65,7 @@ class Growing:
         self,
         study: Study,
         keys: Mapping[str, Any],
-        space: Space | FaultSpace,
+        space: Space,
         *,
         runs: int,
         command: Sequence[str],
@@ -76,8 +75,8 @@ class Growing:
         self.study = study
         self._keys = keys
         self._space = space
-        self._base = replace(tried, study=study, sources=tried.sources | extra)
-        self._base = replace(self._base, search=Search(runs=runs, command=list(command)))
+        made_by = Search(runs=runs, command=list(command))
+        self._base = replace(tried, study=study, sources=tried.sources | extra, search=made_by)
         self._levels: dict[Place, Level] = {}  # of all points, each once
         self._told = 0  # points that the folder knows
         self._batches = 0

@@ -26,7 +26,7 @@ from ..support.bars import Show, unseen
 from ..support.tables import Table
 from .answer import StudyAnswer
 from .growing import Growing, study_of
-from .proposals import Point, proposals
+from .proposals import Point
 from .space import Interval, SearchSpec, Space, as_set, read_space
 from .spec import Maximise, Minimise, results_folder
 
@@ -223,7 +223,7 @@ def optimise(
     work = _Optimising(spec, goal)
     found = work.found
     found.folder = folder = out or results_folder(work.name, "optimisation")
-    chosen = proposals(found.space.widths, work.seed, found.guided, _TOGETHER)
+    chosen = found.space.proposals(work.seed, _TOGETHER)
     points = next(chosen)[: goal.points]
     with work.growing.opened(points, folder, jobs, timeout):
         while True:

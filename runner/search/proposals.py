@@ -168,7 +168,7 @@ class _Signals:
         shares: list[float] = []
         for width in self._widths:
             pieces = width if way.is_dense else 1 + int(stream.random() * min(width, PIECES))
-            starts = [0, *sorted(1 + each for each in _permuted(stream, width - 1)[: pieces - 1])]
+            starts = [0, *sorted(1 + each for each in stream.permutation(width - 1).tolist()[: pieces - 1])]
             for start, end in zip(starts, [*starts[1:], width], strict=True):
                 level = stream.random()
                 shares += [float(level < 0.5) if way.at_ends else level] * (end - start)
@@ -201,10 +201,6 @@ class _Signals:
                 level = float(level < 0.5)
             shares[first : last + 1] = [level] * (last + 1 - first)
         return tuple(shares)
-
-
-def _permuted(stream: Stream, count: int) -> list[int]:
-    return list(map(int, stream.permutation(count))) if count else []
 
 
 def spread(axes: int, seed: int, number: int) -> list[Point]:

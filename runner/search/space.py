@@ -1,20 +1,23 @@
-"""What a search is given, and what it varies: ranges and lists, as ``--vary`` says them, and points in them."""
+"""What a search is given, and what it varies: ranges and lists, as ``--vary`` says them, or the faults of one run."""
 
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Iterable, Iterator
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, field
 from decimal import Decimal
+from heapq import heappop, heappush
 from importlib.util import find_spec
 from itertools import islice
 from typing import Any, ClassVar
 
-from epicycle.actors import UnitError, counted, declared_parameters, parse_unit
+from epicycle.actors import UnitError, counted, declared_parameters, parse_unit, random_stream
 
 from ..model.build.model import Model
+from ..model.graph.acts import ActName
 from ..model.language.dimensions import (
     RANGE,
     Dimension,
@@ -28,12 +31,16 @@ from ..model.language.dimensions import (
     number_node,
     split_number,
 )
+from ..model.language.disturbance import EXACTLY
 from ..model.language.settings import Setting, parse_setting
 from ..model.language.study import RESERVED
 from ..model.text.document import Entry, Mapping, Node, Scalar, Sequence, plain
+from ..model.text.files import COMMAND_LINE
 from ..model.text.patterns import matches, select
 from ..model.text.problems import POISON, Position, Problems
+from ..model.text.program import node_of
 from ..study.run_spec import RunSpec, seconds
+from .proposals import BATCH, Point, Proposals, proposals, ranks
 
 HINT = "write load=0.5..0.9, policy=[fifo, lifo] or 'period={from: 1 s, to: 5 s, step: 1 s}'"
 _BARE = re.compile(r"[A-Za-z0-9_.+ -]+")  # a text that needs no quotes in YAML, where it is not a number
@@ -41,6 +48,8 @@ _RANGE = re.compile(r"(.*?\S)\s*\.\.\s*(\S.*)")
 MAX_VALUES = 100_000  # of a list
 MAX_WHOLE, MAX_NUMBER = 10**15, 10**300  # of the ends of a range
 _DIGITS = 6  # of the width of a range, to which its numbers are drawn
+_OF_FAULTS = Position(COMMAND_LINE, 1, 1, 1, "--max-faults")
+_VALUES = 8  # numbers in the text of a study that a fault takes, about
 
 
 @dataclass(frozen=True)
@@ -170,9 +179,9 @@ class Space:
         """The columns of the table, and what they hold."""
         return {axis.path: axis.kind for axis in self.axes}
 
-    def level(self, shares: Many[float]) -> Level:
-        """The point at these shares of the axes."""
-        left = iter(shares)
+    def level(self, point: Point) -> Level:
+        """What a point sets, which has shares of the axes."""
+        left = iter(point)
         nodes = [axis.node(*islice(left, axis.width)) for axis in self.axes]
         pairs = list(zip(self.axes, nodes, strict=True))
         settings = tuple(Setting(axis.path, node, axis.position) for axis, node in pairs)
@@ -180,9 +189,8 @@ class Space:
 
     def dimensions(self, levels: Many[Level]) -> tuple[Dimension, ...]:
         """These points, as what a study varies."""
-        if not self.axes:
-            return ()
-        return (Listed("point", self.axes[0].position, self.columns, list(levels)),)
+        at = self.axes[0].position if self.axes else _OF_FAULTS
+        return (Listed("point", at, self.columns, list(levels)),) if self.columns else ()
 
     def ends(self) -> tuple[Dimension, ...]:
         """The ends of each range and each value of each list: a study of which all conditions must load."""
@@ -192,6 +200,70 @@ class Space:
             levels = [Level((each,), {axis.path: axis.factor(each.node)}) for each in settings]
             found.append(Listed(axis.path, axis.position, {axis.path: axis.kind}, levels))
         return tuple(found)
+
+    def proposals(self, seed: int, together: int = BATCH) -> Proposals:
+        """Batches of points, guided by what is found at those before."""
+        return proposals(self.widths, seed, self.is_guided, together)
+
+
+class FaultSpace(Space):
+    """All sets of at most ``most`` of some acts; a point has their places among ``acts``."""
+
+    def __init__(self, acts: Many[ActName], most: int) -> None:
+        super().__init__(())
+        self.acts = tuple(acts)
+        self.most = min(most, len(acts))
+        self.width = _VALUES * self.most
+        self.content = "faults"
+
+    @property
+    def columns(self) -> dict[str, str]:
+        return {EXACTLY: "text"}
+
+    def level(self, point: Point) -> Level:
+        """The acts of a point, and no others."""
+        acts = [self.acts[int(place)] for place in point]
+        node = node_of([{"aspect": each.aspect, "at": each.place, "token": each.token} for each in acts], _OF_FAULTS)
+        return Level((Setting(EXACTLY, node, _OF_FAULTS),), {EXACTLY: as_factor(node, "text")})
+
+    def ends(self) -> tuple[Dimension, ...]:
+        """All acts at once, and none: with both, a model must load."""
+        return self.dimensions([self.level(tuple(range(len(self.acts)))), self.level(())])
+
+    def sizes(self) -> list[int]:
+        """How many sets there are of 0 acts, 1 act, and so on."""
+        return [math.comb(len(self.acts), size) for size in range(self.most + 1)]
+
+    def proposals(self, seed: int, together: int = BATCH) -> Proposals:
+        """Batches of sets until all have been: smaller sets first, and of one size those of the worst acts first.
+
+        The worst are those with the least robustness alone; single acts come in a random order.
+        """
+        order = random_stream(seed, "acts").permutation(len(self.acts)).tolist()
+        alone: list[float | None] = []
+        sets: Iterator[Point] = iter([(), *((place,) for place in order)])
+        while batch := list(islice(sets, BATCH)):
+            alone += yield batch
+        places = ranks(alone[1:])
+        worst = [place for _, place in sorted(zip(places, order, strict=True), key=lambda each: each[0])]
+        for size in range(2, self.most + 1):
+            sets = (tuple(worst[rank] for rank in each) for each in _by_sum(size, len(worst)))
+            while batch := list(islice(sets, BATCH)):
+                yield batch
+
+
+def _by_sum(size: int, count: int) -> Iterator[tuple[int, ...]]:
+    """All sets of so many numbers below ``count``, those with the least sum first."""
+    least = tuple(range(size))
+    waiting, seen = [(math.comb(size, 2), least)], {least}  # by their sums
+    while waiting:
+        total, each = heappop(waiting)
+        yield each
+        for place, following in enumerate([*each[1:], count]):
+            more = (*each[:place], each[place] + 1, *each[place + 1 :])
+            if more[place] < following and more not in seen:
+                seen.add(more)
+                heappush(waiting, (total + 1, more))
 
 
 def said(levels: Many[Level]) -> dict[str, object]:

@@ -7,9 +7,8 @@ Source: A. M. Law, *Simulation Modeling and Analysis*, chapters 4, 9 and 10.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from epicycle.actors import normal_quantile, random_stream
@@ -50,10 +49,11 @@ def half_of(values: Sequence[float], level: float = LEVEL, *, is_share: bool = F
 
 
 def _standard_error(values: Sequence[float]) -> float:
-    return _deviation(values) / math.sqrt(len(values)) if len(values) > 1 else math.nan
+    return deviation(values) / math.sqrt(len(values)) if len(values) > 1 else math.nan
 
 
-def _deviation(values: Sequence[float]) -> float:
+def deviation(values: Sequence[float]) -> float:
+    """The standard deviation of a sample, of two values or more."""
     mean = math.fsum(values) / len(values)
     gaps = [value - mean for value in values]
     return math.sqrt(math.fsum(gap * gap for gap in gaps) / (len(values) - 1))
@@ -83,30 +83,18 @@ def with_interval(estimate: Estimate) -> str:
     return f"{value} ({rounded(estimate.low, width)} to {rounded(estimate.high, width)})"
 
 
-def resampled_sums(values: Sequence[float], number: int) -> NDArray[np.float64]:
-    """Sums of bootstrap samples, in order; every call with equally many values makes the same draws."""
+def resampled_sums(series: Sequence[Sequence[float]], number: int) -> NDArray[np.float64]:
+    """Sums of bootstrap samples of each series, drawn alike for all, and in every call for equally long ones."""
     import numpy as np
 
-    known, sums = np.asarray(values, float), np.zeros(number)
-    count = len(values)
-    for start, draws in _few_draws(count, number) if count * number <= 2_000_000 else _draws(count, number):
-        part = sums[start : start + draws.shape[1]]
-        for chosen in draws:
-            part += known[chosen]
+    known, sums = np.asarray(series, float), np.zeros((len(series), number))
+    count = known.shape[1]
+    stream, most = random_stream(0, "resampling"), max(1, 1_000_000 // count)  # that are drawn at a time
+    for start in range(0, number, most):
+        part = sums[:, start : start + most]
+        for chosen in stream.integers(count, size=(part.shape[1], count)).T:
+            part += known[:, chosen]
     return sums
-
-
-def _draws(count: int, number: int) -> Iterator[tuple[int, NDArray[np.int64]]]:
-    """The choices of bootstrap samples, a million at a time: (choice, sample)."""
-    import numpy as np
-
-    stream, rows = random_stream(0, "resampling"), max(1, 1_000_000 // count)
-    for start in range(0, number, rows):
-        size = (min(rows, number - start), count)
-        yield start, np.ascontiguousarray(stream.integers(count, size=size).T)
-
-
-_few_draws = lru_cache(maxsize=2)(lambda count, number: list(_draws(count, number)))
 
 
 def rate(successes: int, count: int, level: float = LEVEL) -> Estimate:

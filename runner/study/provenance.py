@@ -16,7 +16,6 @@ PACKAGES = ("epicycle", "simpy", "numpy", "scipy", "numba", "filterpy", "network
 
 _REVISION = re.compile(r"[0-9a-f]{40}|[0-9a-f]{64}")
 _REFERENCE = re.compile(r"refs(/(?!\.)[^/\s\x00\\]+)+")
-_REFERENCES = 5  # that may lead to each other
 _MOST = 2**24  # bytes of a file that are read
 
 
@@ -64,21 +63,14 @@ def _head_of(git: Path) -> str | None:
         git = git.parent / _line(git).removeprefix("gitdir: ")
     common = git / "commondir"  # where the references of a worktree are
     shared = git / _line(common) if common.exists() else git
-    name = _line(git / "HEAD")
-    for _ in range(_REFERENCES):
-        if _REVISION.fullmatch(name):
-            return name
-        name = name.removeprefix("ref: ")
-        if not _REFERENCE.fullmatch(name):
-            return None
-        for place in (git / name, shared / name):
-            if place.is_file():
-                name = _line(place)
-                break
-        else:
-            packed = re.search(rf"^([0-9a-f]+) {re.escape(name)}$", _text(shared / "packed-refs"), re.M)
-            name = "" if packed is None else packed[1]
-    return None
+    found = _line(git / "HEAD")
+    if _REFERENCE.fullmatch(name := found.removeprefix("ref: ")):
+        packed = re.compile(rf"^([0-9a-f]+) {re.escape(name)}$", re.M)
+        if (shared / name).is_file():
+            found = _line(shared / name)
+        elif said := packed.search(_text(shared / "packed-refs")):
+            found = said[1]
+    return found if _REVISION.fullmatch(found) else None
 
 
 def _line(path: Path) -> str:

@@ -12,7 +12,7 @@ import epicycle
 from epicycle.actors import EpicycleError
 from epicycle.runner.interface.cli import main
 from epicycle.runner.model.graph.acts import ActName
-from epicycle.runner.search.faults import FaultSpace, _by_sum
+from epicycle.runner.search.space import FaultSpace, _by_sum
 
 # A plan comes each second: one that is lost makes the robot's plan 1.9 s old, two in a row 2.9 s.
 TEXT = """

@@ -125,7 +125,7 @@ def _confidence(costs: list[dict[int, float]]) -> list[float]:
         return [0.0] * len(costs)
     import numpy as np
 
-    sums = np.array([resampled_sums([each[one] for one in common], RESAMPLES) for each in costs])
+    sums = resampled_sums([[each[one] for one in common] for each in costs], RESAMPLES)
     means = np.round(sums / len(common), 12)
     is_best = means == means.min(axis=0)
     ties = np.count_nonzero(is_best, axis=0)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from ...model.language.sampling import SOBOL, Design
-from ..inference import LEVEL, Estimate, mean, resampled_sums
+from ..inference import LEVEL, Estimate, deviation, mean, resampled_sums
 from .samples import Levels, Samples, has_enough
 
 FIRST, TOTAL = "first_order", "total"
@@ -101,15 +101,14 @@ def _shares(blocks: Sequence[Sequence[float]], level: float) -> list[dict[str, E
 
 def _with_resamples(values: Sequence[float]) -> list[float]:
     """The sum, and the sums of bootstrap samples, which are drawn alike for all values of the same blocks."""
-    return [math.fsum(values), *resampled_sums(values, RESAMPLES).tolist()]
+    [sums] = resampled_sums([values], RESAMPLES)
+    return [math.fsum(values), *sums.tolist()]
 
 
 def _percentiles(values: Sequence[float], level: float, count: int) -> Estimate:
     first, resampled = values[0], sorted(values[1:])
-    middle = math.fsum(resampled) / len(resampled)
-    error = math.sqrt(math.fsum((each - middle) * (each - middle) for each in resampled) / (len(resampled) - 1))
     outside = round((1.0 - level) / 2.0 * (len(resampled) + 1))
-    return Estimate(first, error, resampled[max(outside, 1) - 1], resampled[-max(outside, 1)], count)
+    return Estimate(first, deviation(resampled), resampled[max(outside, 1) - 1], resampled[-max(outside, 1)], count)
 
 
 def _effects(
