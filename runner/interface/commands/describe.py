@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...support.declare.commands import arguments, declared
 from ...support.printing import columns, complain, console, tell, tell_json
-from ..calls import differing, picturing, running
+from ..calls import differing, picturing, running, studying
 from .listing import LIKE, known_types
 from .options import BAD_INPUT, DONE, FAILED, JSON, command, load, of_call, option, own_types, taken
 
@@ -95,16 +95,11 @@ def _plan(options: argparse.Namespace) -> Plan:
     """The plan of a study that is valid."""
     from epicycle.actors import EpicycleError
 
-    from ...model.language.study import read_study
-    from ...show.report import check_figures
-    from ...study.plan.plan import Plan
-
     for each in declared(running.load):
         if each.name not in ("model", "set", "types") and hasattr(options, each.name):
             raise EpicycleError(f"{each.flag} is for models: a study states in its file what it changes")
     given = arguments(running.load, options)
-    plan = Plan.made(read_study(options.model, set=given.get("set", ()), types=map(Path, given.get("types", ()))))
-    check_figures(plan)
+    plan, _ = studying.plan_of(options.model, set=given.get("set", ()), types=given.get("types", ()))
     return plan
 
 
