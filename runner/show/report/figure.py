@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -164,9 +165,10 @@ class Layout:
         self.roles = found
         self.names = Names(data.plan, figure.labels)
         self.chosen = data.where(figure.where)
+        self.levels_of = partial(data.levels, conditions=self.chosen, fixed=figure.where)
         self.handles: dict[str, Any] = {}
-        levels: list[Factor] = data.levels(found.lines, self.chosen, figure.where) if found.lines else [None]
-        choices = [data.levels(name, self.chosen, figure.where) for name in found.panels]
+        levels: list[Factor] = self.levels_of(found.lines) if found.lines else [None]
+        choices = [self.levels_of(name) for name in found.panels]
         panels = []
         for combination in product(*choices):
             place = dict(zip(found.panels, combination, strict=True))

@@ -167,20 +167,19 @@ class Distributions(TableFigure):
     def _boxes(self, sheet: Sheet, axes: Any, data: Data, metric: str, panel: Panel, arranged: Layout) -> None:
         from matplotlib.patches import Patch
 
-        names, over, lines = arranged.names, arranged.roles.over, len(arranged.levels)
-        levels = data.levels(over, arranged.chosen, self.where) if over else [None]
+        names, over, lines, axis = arranged.names, arranged.roles.over, len(arranged.levels), _Axis(data, arranged)
         width = 0.8 / lines
         for number, (line, conditions) in enumerate(panel.lines.items()):
             colour = arranged.shades[number]
             groups: dict[int, list[float]] = {}
-            for place, level in enumerate(levels):
+            for place, level in enumerate(axis.levels):
                 here = [each for each in conditions if not over or each.values[over] == level]
                 if values := _numbers(here, metric):
                     groups[place] = values
             places = {place: place + width * (number - (lines - 1) / 2) for place in groups}
             for place, values in groups.items():
                 value = f"{names.words(metric)}: {_spread(values, names.unit(metric))} ({counted(len(values), 'run')})"
-                at = names.place({over: levels[place]}) if over else ""
+                at = names.place({over: axis.levels[place]}) if over else ""
                 said = "\n".join(filter(None, (value, at, arranged.about(panel, line))))
                 sheet.tip(axes, [(places[place], statistics.median(values))], [said])
             if groups:
@@ -197,10 +196,9 @@ class Distributions(TableFigure):
                     flierprops={"markerfacecolor": colour},
                 )
             arranged.show(line, Patch(facecolor=colour, alpha=0.5, edgecolor=colour))
-        axes.set_xlim(-0.6, len(levels) - 0.4)
-        texts = [names.level("", level) if over else "" for level in levels]
-        _texts_along(axes, range(len(levels)), texts, sheet.columns)
-        sheet.call(axes, names.axis(over) if over else "", names.axis(metric))
+        axes.set_xlim(-0.6, len(axis.levels) - 0.4)
+        _texts_along(axes, range(len(axis.levels)), axis.texts, sheet.columns)
+        sheet.call(axes, axis.name, names.axis(metric))
         axes.grid(axis="x", visible=False)
         if self.limit is not None:
             axes.axhline(self.limit, color=LIMIT, linewidth=1.0, zorder=1)
@@ -253,10 +251,10 @@ class _Axis:
     def __init__(self, data: Data, arranged: Layout) -> None:
         self._factor = factor = arranged.roles.over
         self.name = arranged.names.axis(factor) if factor else ""
-        self._levels: list[Factor] = data.levels(factor, arranged.chosen) if factor else [None]
-        self._texts = [arranged.names.level("", level) if factor else "" for level in self._levels]
-        self.is_numeric = factor is not None and is_numeric(data.plan, factor) and None not in self._levels
-        self._places = [self._of(level) for level in self._levels]  # in the order of the study
+        self.levels: list[Factor] = arranged.levels_of(factor) if factor else [None]
+        self.texts = [arranged.names.level("", level) if factor else "" for level in self.levels]
+        self.is_numeric = factor is not None and is_numeric(data.plan, factor) and None not in self.levels
+        self._places = [self._of(level) for level in self.levels]  # in the order of the levels
         places = sorted(set(self._places))
         self.step = min((after - before for before, after in pairwise(places)), default=1.0)
         dimension = next((each for each in data.plan.study.dimensions if factor in each.columns), None)
@@ -266,7 +264,7 @@ class _Axis:
     def _of(self, level: Factor) -> float:
         if self.is_numeric and isinstance(level, (int, float)):
             return float(level)
-        return float(self._levels.index(level))
+        return float(self.levels.index(level))
 
     def place(self, condition: Condition) -> float:
         return self._of(condition.values[self._factor]) if self._factor else 0.0
@@ -278,7 +276,7 @@ class _Axis:
         if is_log:
             return
         if not self.is_numeric or (self.is_connected and len(self._places) <= 12):
-            _texts_along(axes, self._places, self._texts, columns)
+            _texts_along(axes, self._places, self.texts, columns)
         if not self.is_numeric:
             axes.set_xlim(-0.5, len(self._places) - 0.5)
 
