@@ -33,12 +33,15 @@ def validate(options: argparse.Namespace) -> int:
 
     --json prints every problem with its code, which docs/problems.md explains, and the change that would remove it.
     """
-    from epicycle.actors import EpicycleError
+    from epicycle.actors import EpicycleError, counted
 
     if options.json:
         return _validate_for_programs(options)
     if _is_study(options.model):
-        return _validate_study(options)
+        plan = _plan(options)
+        runs = f"{counted(plan.replications, 'replication')}, {counted(plan.size, 'run')}"
+        tell(f"{options.model} is valid: {counted(plan.conditions, 'condition')} of {runs}")
+        return DONE
     model = load(options, strict=options.strict)
     if model.endless:
         told = f"{model.endless}\n   help: write 'run: {{stop: 60 s}}', or run it with --until"
@@ -79,20 +82,8 @@ def _is_study(name: str) -> bool:
     return name in packaged_studies() and name not in packaged_models()
 
 
-def _validate_study(options: argparse.Namespace) -> int:
-    """Load the model at every level that the study varies."""
-    from epicycle.actors import counted
-
-    plan = _plan(options)
-    tell(
-        f"{options.model} is valid: {counted(plan.conditions, 'condition')} of "
-        f"{counted(plan.replications, 'replication')}, {counted(plan.size, 'run')}"
-    )
-    return DONE
-
-
 def _plan(options: argparse.Namespace) -> Plan:
-    """The plan of a study that is valid."""
+    """The plan of a study that is valid: its model has been loaded at every level that it varies."""
     from epicycle.actors import EpicycleError
 
     for each in declared(running.load):
@@ -213,13 +204,12 @@ def _describe_type(options: argparse.Namespace) -> int:
     from ...model.catalogue.packaged import packaged_models
     from ...model.catalogue.reference import describe, parts_of
     from ...model.catalogue.types import load_all
-    from ...show.reference import described, detail, parts_described
+    from ...show.reference import detail, parts_described
 
     known, name = known_types(options), options.model
     types = {**known.actors, **known.aspects}
     if name in types:
-        (reference,) = described({name: types[name]})
-        parts = parts_described([types[name]])
+        reference, parts = describe(name, types[name]), parts_described([types[name]])
     else:
         loaded, _ = load_all(types)
         of_bases = parts_of(loaded.values())
