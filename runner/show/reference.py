@@ -48,17 +48,17 @@ def by_group(references: Iterable[TypeReference]) -> Iterator[tuple[tuple[str, s
 # -- for a terminal -------------------------------------------------------------------------------------------------
 
 
-def overview(references: Sequence[TypeReference]) -> Group:
-    """One line for each type, under the heading of its topic."""
-    width = max((len(each.name) for each in references), default=0)
+def overview(groups: Mapping[tuple[str, str], Mapping[str, str]]) -> Group:
+    """One line for each name with what it is, under the heading of its group and what this is."""
+    width = max((len(name) for members in groups.values() for name in members), default=0)
     blocks: list[RenderableType] = []
-    for (group, about), members in by_group(references):
+    for (group, about), members in groups.items():
         blocks += [Text(""), Text.assemble((group, "bold"), f"  {about}" if about else "")]
         table = Table(box=None, show_header=False, pad_edge=False)
         table.add_column(width=width + 2, no_wrap=True)
         table.add_column()
-        for each in members:
-            table.add_row(Text(f"  {each.name}"), Text(each.summary))
+        for name, what in members.items():
+            table.add_row(Text(f"  {name}"), Text(what))
         blocks.append(table)
     return Group(*blocks[1:])
 

@@ -172,14 +172,6 @@ def every(times: Floats, interval: float) -> list[int]:
     return [int(index) for index in np.unique(steps, return_index=True)[1]]
 
 
-def round_step(about: float) -> float:
-    """The smallest time that is 1, 2 or 5 times a power of ten and not less than the given one."""
-    if not about > 0.0:
-        return 1.0
-    power = 10.0 ** math.floor(math.log10(about))
-    return next(power * factor for factor in (1, 2, 5, 10) if power * factor >= about * (1 - 1e-9))
-
-
 def arrows(axes: Any, points: Floats, shade: str, *, size: float = 11.0, zorder: float = 4.5) -> None:
     """Arrowheads halfway along a path and at its end, in the direction of the path."""
     walked = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])

@@ -174,11 +174,15 @@ def explain(
 
     >>> epicycle.explain("collision_avoidance", "always clearance.distance >= 4 m", seed=3, set={"disturbance": 0.5})
     """
+    from epicycle.actors import EpicycleError
+
     from ...search.explaining import explain as search
     from ...search.monitored import monitors_named
     from ...study.run_spec import spec_of
     from ...support.bars import bar, telling
 
+    if runs < 1:
+        raise EpicycleError(f"runs: {runs} is not a whole number of at least 1")
     found = opened(model, seed, until, changes)
     made, seed = copy.copy(found.model), found.model.output.seed if found.seed is None else found.seed
     spec = spec_of(made, seed, found.until)
@@ -193,7 +197,7 @@ def explain(
             monitors_named(made, monitor, flag=flag),
             seed=seed,
             until=found.until,
-            limit=_at_least_one("runs", runs),
+            limit=runs,
             only=[only] if isinstance(only, str) else [*only],
             folder=folder,
             jobs=jobs,
@@ -255,11 +259,3 @@ def rare(
         )
     answer.folder = folder
     return answer
-
-
-def _at_least_one(what: str, number: int) -> int:
-    from epicycle.actors import EpicycleError
-
-    if number < 1:
-        raise EpicycleError(f"{what}: {number} is not a whole number of at least 1")
-    return number

@@ -61,11 +61,8 @@ def what_if(
     from ...search.what_if import what_if as search
     from .searching import folder_for
 
-    def several(given: str | Iterable[str]) -> list[str]:
-        return [given] if isinstance(given, str) else [*given]
-
     tag, found = tag_of(at), opened(model, seed, until, changes)
-    wanted = Changed(change, several(remove), several(let_through), several(lose))
-    answer = search(found.model, tag, wanted, seed=found.seed, until=found.until, progress=progress)
+    acts = ([each] if isinstance(each, str) else [*each] for each in (remove, let_through, lose))
+    answer = search(found.model, tag, Changed(change, *acts), seed=found.seed, until=found.until, progress=progress)
     answer.folder = folder_for([found.model], out, "what_if")
     return answer

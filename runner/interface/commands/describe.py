@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...support.declare.commands import arguments, declared
 from ...support.printing import columns, complain, console, tell, tell_json
-from ..calls import differing, picturing, running
+from ..calls import differing, picturing, running, studying
 from .listing import LIKE, known_types
 from .options import BAD_INPUT, DONE, FAILED, JSON, command, load, of_call, option, own_types, taken
 
@@ -33,12 +33,15 @@ def validate(options: argparse.Namespace) -> int:
 
     --json prints every problem with its code, which docs/problems.md explains, and the change that would remove it.
     """
-    from epicycle.actors import EpicycleError
+    from epicycle.actors import EpicycleError, counted
 
     if options.json:
         return _validate_for_programs(options)
     if _is_study(options.model):
-        return _validate_study(options)
+        plan = _plan(options)
+        runs = f"{counted(plan.replications, 'replication')}, {counted(plan.size, 'run')}"
+        tell(f"{options.model} is valid: {counted(plan.conditions, 'condition')} of {runs}")
+        return DONE
     model = load(options, strict=options.strict)
     if model.endless:
         told = f"{model.endless}\n   help: write 'run: {{stop: 60 s}}', or run it with --until"
@@ -79,32 +82,15 @@ def _is_study(name: str) -> bool:
     return name in packaged_studies() and name not in packaged_models()
 
 
-def _validate_study(options: argparse.Namespace) -> int:
-    """Load the model at every level that the study varies."""
-    from epicycle.actors import counted
-
-    plan = _plan(options)
-    tell(
-        f"{options.model} is valid: {counted(plan.conditions, 'condition')} of "
-        f"{counted(plan.replications, 'replication')}, {counted(plan.size, 'run')}"
-    )
-    return DONE
-
-
 def _plan(options: argparse.Namespace) -> Plan:
-    """The plan of a study that is valid."""
+    """The plan of a study that is valid: its model has been loaded at every level that it varies."""
     from epicycle.actors import EpicycleError
-
-    from ...model.language.study import read_study
-    from ...show.report import check_figures
-    from ...study.plan.plan import Plan
 
     for each in declared(running.load):
         if each.name not in ("model", "set", "types") and hasattr(options, each.name):
             raise EpicycleError(f"{each.flag} is for models: a study states in its file what it changes")
     given = arguments(running.load, options)
-    plan = Plan.made(read_study(options.model, set=given.get("set", ()), types=map(Path, given.get("types", ()))))
-    check_figures(plan)
+    plan, _ = studying.plan_of(options.model, set=given.get("set", ()), types=given.get("types", ()))
     return plan
 
 
@@ -218,13 +204,12 @@ def _describe_type(options: argparse.Namespace) -> int:
     from ...model.catalogue.packaged import packaged_models
     from ...model.catalogue.reference import describe, parts_of
     from ...model.catalogue.types import load_all
-    from ...show.reference import described, detail, parts_described
+    from ...show.reference import detail, parts_described
 
     known, name = known_types(options), options.model
     types = {**known.actors, **known.aspects}
     if name in types:
-        (reference,) = described({name: types[name]})
-        parts = parts_described([types[name]])
+        reference, parts = describe(name, types[name]), parts_described([types[name]])
     else:
         loaded, _ = load_all(types)
         of_bases = parts_of(loaded.values())

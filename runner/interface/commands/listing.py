@@ -50,9 +50,11 @@ def _models(options: argparse.Namespace) -> int:
     """The models that come with Epicycle, the disturbances for --disturb, and the studies."""
     from ...model.build.load import load_model
     from ...model.catalogue.packaged import packaged_disturbances, packaged_models, packaged_studies
+    from ...model.catalogue.reference import first_sentence
     from ...model.language.disturbance import load_disturbance
     from ...model.language.study import read_study
     from ...model.text.problems import Problems
+    from ...show.reference import overview
 
     problems = Problems()
     disturbances = {name: load_disturbance(name, problems) for name in packaged_disturbances()}
@@ -65,16 +67,9 @@ def _models(options: argparse.Namespace) -> int:
     if options.json:
         tell_json(found, indent=2)
         return DONE
-    heads = {
-        "models": "",
-        "disturbances": "\ndisturbances, added with --disturb:",
-        "studies": "\nstudies, run with epicycle study:",
-    }
-    for kind, docs in found.items():
-        if heads[kind]:
-            tell(heads[kind])
-        for name, doc in docs.items():
-            tell(f"{name}: {doc.partition('. ')[0]}" if doc else name)
+    about = {"models": "", "disturbances": "added with --disturb", "studies": "run with epicycle study"}
+    said = {kind: {name: first_sentence(doc) for name, doc in docs.items()} for kind, docs in found.items()}
+    console().print(overview({(kind, about[kind]): docs for kind, docs in said.items()}))
     return DONE
 
 
@@ -82,7 +77,7 @@ def _types(options: argparse.Namespace) -> int:
     from dataclasses import asdict
 
     from ...model.catalogue.types import load_all
-    from ...show.reference import described, overview
+    from ...show.reference import by_group, described, overview
 
     known = known_types(options)
     loaded, errors = load_all(known.actors if options.what == "actors" else known.aspects)
@@ -92,7 +87,8 @@ def _types(options: argparse.Namespace) -> int:
     if options.json:
         tell_json([asdict(each) for each in references], indent=2)
     else:
-        console().print(overview(references))
+        groups = {group: {each.name: each.summary for each in members} for group, members in by_group(references)}
+        console().print(overview(groups))
     return DONE
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ...search.spec import GOALS, Break, Goal, Match
@@ -45,23 +45,19 @@ def _goal(options: argparse.Namespace) -> Goal:
     """The goal that the options name; raises ``EpicycleError`` for options of another one."""
     from epicycle.actors import EpicycleError
 
-    [kind] = [goal for goal in GOALS if hasattr(options, goal.__name__)]
-    others = [each.name for each in declared(kind)][1:]
+    takers: dict[tuple[str, str], list[type[Goal]]] = {}  # by the name and the flag of what they take
     for goal in GOALS:
         for each in [*declared(goal)][1:]:
-            if each.name not in others and hasattr(options, each.name):
-                raise EpicycleError(f"{each.flag} is for {' and '.join(_flags_with(each.name))}")
-    given: Any = {name: getattr(options, name) for name in others if hasattr(options, name)}
+            takers.setdefault((each.name, each.flag), []).append(goal)
+    [kind] = [goal for goal in GOALS if hasattr(options, goal.__name__)]
+    given: Any = {}
+    for (name, flag), goals in takers.items():
+        if hasattr(options, name):
+            if kind not in goals:
+                raise EpicycleError(f"{flag} is for {' and '.join(next(declared(goal)).flag for goal in goals)}")
+            given[name] = getattr(options, name)
     chosen: Any = getattr(options, kind.__name__) or None
     return kind(chosen, **given)
-
-
-def _flags_with(name: str) -> Iterator[str]:
-    """The goals that have such an option."""
-    for goal in GOALS:
-        first, *others = declared(goal)
-        if name in (each.name for each in others):
-            yield first.flag
 
 
 @of_call(searching.search, JSON, first=(_goals,), imports=("search.falsifying", "search.optimising"))

@@ -18,10 +18,7 @@ if TYPE_CHECKING:
     from ...study.plan.plan import Plan
 
 SHOWN = 5  # failed runs that are reported one by one
-
-
-FOLDER = option("folder", metavar="DIR", type=Path, help="the results folder")
-FOLDER_OF_STUDY = option("folder", metavar="DIR", type=Path, help="the results folder of the study")
+FOLDER = option("folder", metavar="DIR", type=Path, help="the results folder of the study")
 
 
 # -- making runs ------------------------------------------------------------------------------------------------------
@@ -178,7 +175,7 @@ def status(options: argparse.Namespace) -> int:
 
 @command(
     "write the report of a study",
-    FOLDER_OF_STUDY,
+    FOLDER,
     option("--out", metavar="DIR", type=Path, help="folder to write to (default: the results folder)"),
     taken(studying.study, only={"jobs", "types"}),
     imports=("show.report", "study"),

@@ -34,7 +34,7 @@ from ..canvas import FORMATS, draw
 from ..samples import Floats, selected
 from ..sheet import colours, set_log, width_of
 from ..space import positions
-from ..trajectories import arrows, every, round_step, tip_path, write_times
+from ..trajectories import arrows, every, tip_path, write_times
 from .data import Condition, Data, Names
 from .figure import RunKey, SignalFigure
 
@@ -182,6 +182,8 @@ class Tracks(RepeatedFigure):
         }
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
+        from matplotlib.ticker import MaxNLocator
+
         arranged = self.arranged(data)
         columns = arranged.columns or (1 if len(arranged.panels) == 1 else 2)
         seen = [way.points for extract in extracts.values() for ways in extract.values() for way in ways]
@@ -189,10 +191,9 @@ class Tracks(RepeatedFigure):
         low, high = points.min(axis=0), points.max(axis=0)
         room = 0.04 * max(*(high - low), 1e-9)
         width, depth = high - low + 2 * room
-        longest = max(
-            (way.times[-1] for each in extracts.values() for way in each["ways"] if len(way.times)), default=1.0
-        )
-        step = round_step(longest / 5)
+        ends = [way.times[-1] for each in extracts.values() for way in each["ways"] if len(way.times)]
+        start, then, *_ = MaxNLocator(5, steps=(1, 2, 5, 10)).tick_values(0.0, max(ends, default=0.0) or 1.0)
+        step = then - start
         height = min(6.0, min(3.8, (width_of(columns) - 0.6) / columns) * depth / width + 0.35)
         sheet = arranged.sheet(columns=columns, height=height, same_x=True, same_y=True)
         for axes, panel in zip(sheet.axes, arranged.panels, strict=False):

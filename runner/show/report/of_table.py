@@ -37,12 +37,11 @@ class Means(TableFigure):
     """The mean of a metric over a factor, with 95 % intervals (Student; of shares Wilson): a line for each level of
     another factor, and a panel for each level of a third.
 
-    Several metrics each get a row of panels, or become the lines of one panel.
+    Several metrics each get a row of panels.
     """
 
     metric = texts_parameter(doc="column of the table, or several")
     over: Parameter[str | None] = Parameter(str, None, doc="factor along the axis; the first numeric one if left out")
-    together = Parameter(bool, False, doc="whether several metrics are the lines of one panel; they need the same unit")
     same_scale = Parameter(bool, True, doc="whether all panels have the same vertical axis")
     log_x = Parameter(bool, False, doc="whether the horizontal axis is logarithmic")
     log_y = Parameter(bool, False, doc="whether the vertical axis is logarithmic")
@@ -51,26 +50,18 @@ class Means(TableFigure):
         yield from super().complaints(plan)
         if not self.metric:
             yield Fault("it names no metric", ("metric",), help=("name at least one",))
-        units = {plan.columns[name].unit for name in self.metric if name in plan.columns}
-        if self.together and len(units) > 1:
-            units_of = ", ".join(f"{name} in {plan.columns[name].unit or '1'}" for name in self.metric)
-            yield Fault("metrics in one panel need the same unit", ("together",), help=(units_of,))
-        if self.together and self.lines:
-            advice = "leave out 'lines' or 'together'"
-            yield Fault("the metrics are already its lines", ("lines",), help=(advice,))
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
-        arranged = self.arranged(data, has_axis=True, metrics=self.metric if self.together else ())
+        arranged = self.arranged(data, has_axis=True)
         names, axis = arranged.names, _Axis(data, arranged)
-        sheet, panels = by_metric(arranged, self.metric[:1] if self.together else self.metric, self.same_scale)
+        sheet, panels = by_metric(arranged, self.metric, self.same_scale)
         for axes, (metric, panel) in zip(sheet.axes, panels, strict=True):
-            for number, (level, conditions) in enumerate(panel.lines.items()):
-                points = self._points(data, axis, conditions, str(level) if self.together else metric)
+            for number, conditions in enumerate(panel.lines.values()):
+                points = self._points(data, axis, conditions, metric)
                 self._line(sheet, axes, axis, arranged, panel, number, points)
             axis.dress(axes, sheet.columns, is_log=self.log_x)
             set_log(axes, x=self.log_x, y=self.log_y)
-            what = f"mean ({names.unit(metric)})" if names.unit(metric) else "mean"
-            sheet.call(axes, axis.name, what if self.together else mean_of(names.axis(metric)))
+            sheet.call(axes, axis.name, mean_of(names.axis(metric)))
         shares = data.plan.shares.intersection(self.metric)
         kind = "Student" if not shares else "Wilson" if shares.issuperset(self.metric) else "Student; of shares Wilson"
         what = mean_of(listed([*map(names.words, self.metric)]))
@@ -176,20 +167,19 @@ class Distributions(TableFigure):
     def _boxes(self, sheet: Sheet, axes: Any, data: Data, metric: str, panel: Panel, arranged: Layout) -> None:
         from matplotlib.patches import Patch
 
-        names, over, lines = arranged.names, arranged.roles.over, len(arranged.levels)
-        levels = data.levels(over, arranged.chosen, self.where) if over else [None]
+        names, over, lines, axis = arranged.names, arranged.roles.over, len(arranged.levels), _Axis(data, arranged)
         width = 0.8 / lines
         for number, (line, conditions) in enumerate(panel.lines.items()):
             colour = arranged.shades[number]
             groups: dict[int, list[float]] = {}
-            for place, level in enumerate(levels):
+            for place, level in enumerate(axis.levels):
                 here = [each for each in conditions if not over or each.values[over] == level]
                 if values := _numbers(here, metric):
                     groups[place] = values
             places = {place: place + width * (number - (lines - 1) / 2) for place in groups}
             for place, values in groups.items():
                 value = f"{names.words(metric)}: {_spread(values, names.unit(metric))} ({counted(len(values), 'run')})"
-                at = names.place({over: levels[place]}) if over else ""
+                at = names.place({over: axis.levels[place]}) if over else ""
                 said = "\n".join(filter(None, (value, at, arranged.about(panel, line))))
                 sheet.tip(axes, [(places[place], statistics.median(values))], [said])
             if groups:
@@ -206,10 +196,9 @@ class Distributions(TableFigure):
                     flierprops={"markerfacecolor": colour},
                 )
             arranged.show(line, Patch(facecolor=colour, alpha=0.5, edgecolor=colour))
-        axes.set_xlim(-0.6, len(levels) - 0.4)
-        texts = [names.level("", level) if over else "" for level in levels]
-        _texts_along(axes, range(len(levels)), texts, sheet.columns)
-        sheet.call(axes, names.axis(over) if over else "", names.axis(metric))
+        axes.set_xlim(-0.6, len(axis.levels) - 0.4)
+        _texts_along(axes, range(len(axis.levels)), axis.texts, sheet.columns)
+        sheet.call(axes, axis.name, names.axis(metric))
         axes.grid(axis="x", visible=False)
         if self.limit is not None:
             axes.axhline(self.limit, color=LIMIT, linewidth=1.0, zorder=1)
@@ -262,10 +251,10 @@ class _Axis:
     def __init__(self, data: Data, arranged: Layout) -> None:
         self._factor = factor = arranged.roles.over
         self.name = arranged.names.axis(factor) if factor else ""
-        self._levels: list[Factor] = data.levels(factor, arranged.chosen) if factor else [None]
-        self._texts = [arranged.names.level("", level) if factor else "" for level in self._levels]
-        self.is_numeric = factor is not None and is_numeric(data.plan, factor) and None not in self._levels
-        self._places = [self._of(level) for level in self._levels]  # in the order of the study
+        self.levels: list[Factor] = arranged.levels_of(factor) if factor else [None]
+        self.texts = [arranged.names.level("", level) if factor else "" for level in self.levels]
+        self.is_numeric = factor is not None and is_numeric(data.plan, factor) and None not in self.levels
+        self._places = [self._of(level) for level in self.levels]  # in the order of the levels
         places = sorted(set(self._places))
         self.step = min((after - before for before, after in pairwise(places)), default=1.0)
         dimension = next((each for each in data.plan.study.dimensions if factor in each.columns), None)
@@ -275,7 +264,7 @@ class _Axis:
     def _of(self, level: Factor) -> float:
         if self.is_numeric and isinstance(level, (int, float)):
             return float(level)
-        return float(self._levels.index(level))
+        return float(self.levels.index(level))
 
     def place(self, condition: Condition) -> float:
         return self._of(condition.values[self._factor]) if self._factor else 0.0
@@ -287,7 +276,7 @@ class _Axis:
         if is_log:
             return
         if not self.is_numeric or (self.is_connected and len(self._places) <= 12):
-            _texts_along(axes, self._places, self._texts, columns)
+            _texts_along(axes, self._places, self.texts, columns)
         if not self.is_numeric:
             axes.set_xlim(-0.5, len(self._places) - 0.5)
 

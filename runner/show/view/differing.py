@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
+from itertools import takewhile, zip_longest
 from typing import Any
 
 from epicycle.actors import Tag, shortened
@@ -77,11 +77,8 @@ def _comes(recording: Recording, number: int, head: tuple[Tag, str]) -> bool:
     """Whether a run has a firing of this actor at this tag, from a number on."""
     (tag, path), fired = head, recording.fired
     actor = recording.places.get(path)
-    while number < len(fired) and fired.tag(number) <= tag:
-        if fired.actors[number] == actor and fired.tag(number) == tag:
-            return True
-        number += 1
-    return False
+    until_then = takewhile(lambda n: fired.tag(n) <= tag, range(number, len(fired)))
+    return any(fired.actors[n] == actor and fired.tag(n) == tag for n in until_then)
 
 
 def affected(recordings: Sequence[Recording]) -> dict[str, Tag]:
@@ -107,8 +104,7 @@ def _by_actor(recording: Recording) -> dict[str, list[int]]:
 
 def _first(one: Sequence[int], other: Sequence[int]) -> int | None:
     """Where two sequences differ first; None if they are equal."""
-    same = next((n for n, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
-    return None if same == len(one) == len(other) else same
+    return next((n for n, (a, b) in enumerate(zip_longest(one, other)) if a != b), None)
 
 
 def _said(recording: Recording, record: int) -> str:
