@@ -116,7 +116,7 @@ def rendered(text: str, after: Any) -> str:
         document = yaml_edit.Document.parse(text.removeprefix(head))
         _write(document, before, after, ())
         changed = head + str(document)
-    except yaml_edit.YamlError:
+    except (yaml_edit.YamlError, LookupError):  # something is other to it than to us
         changed = text
     if _canonical(data_of(changed)) != _canonical(after):
         raise EditError("this text is written in a way that no program can change here: change it by hand")
