@@ -9,9 +9,12 @@ from typing import Any
 from lsprotocol import types as lsp
 from pygls.uris import from_fs_path, to_fs_path
 
+from ..model.text.document import Mapping as MappingNode
+from ..model.text.document import Node, Scalar
 from ..model.text.problems import Position, Problem
 from . import changes, completion, meaning
 from .knowledge import Knowledge
+from .names import SECTIONS, declared_in
 from .places import Positions, positions
 from .reading import read
 
@@ -192,12 +195,24 @@ class Answers:
     # -- requests about a text ------------------------------------------------------------------------------------
 
     def symbols(self, known: Knowledge, params: Any) -> list[lsp.DocumentSymbol]:
-        def symbol(each: meaning.Symbol) -> lsp.DocumentSymbol:
-            where, kind = self.range_of(known, each.position), _LOOKS[each.kind][1]
-            inside = [symbol(inner) for inner in each.inside]
-            return lsp.DocumentSymbol(each.name or " ", kind, where, where, each.kind, children=inside)
+        """What a file declares, section by section."""
 
-        return [symbol(each) for each in meaning.symbols(known.reading.nodes.get(known.file))]
+        def symbol(kind: str, key: Scalar, inside: list[lsp.DocumentSymbol]) -> lsp.DocumentSymbol:
+            where = self.range_of(known, key.position)
+            return lsp.DocumentSymbol(key.text or " ", _LOOKS[kind][1], where, where, kind, children=inside)
+
+        def sections(node: Node | None) -> Iterator[lsp.DocumentSymbol]:
+            if not isinstance(node, MappingNode):
+                return
+            for name, section in node.entries.items():
+                inside = declared_in(node, name, SECTIONS).values() if name in SECTIONS else ()
+                symbols = [
+                    symbol(SECTIONS[name], each.key, [*sections(each.value)] if name == "composites" else [])
+                    for each in inside
+                ]
+                yield symbol("section", section.key, symbols)
+
+        return [*sections(known.reading.nodes.get(known.file))]
 
     def links(self, known: Knowledge, params: Any) -> list[lsp.DocumentLink]:
         return [lsp.DocumentLink(self.range_of(known, at), uri_of(path)) for at, path in meaning.links(known)]

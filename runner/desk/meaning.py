@@ -1,10 +1,9 @@
-"""What stands at a place means: its description, where it is declared, where it is used; and the outline of a file."""
+"""What stands at a place means: its description, where it is declared, and where it is used."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from epicycle.actors import declared_ports, type_name
@@ -12,29 +11,18 @@ from epicycle.actors import declared_ports, type_name
 from ..model.catalogue.packaged import packaged_models
 from ..model.catalogue.reference import as_written, shown
 from ..model.language.files import named_file
-from ..model.text.document import Mapping, Node
 from ..model.text.patterns import in_general
 from ..model.text.problems import Position, Problems
 from ..model.text.reading import Text
 from ..support.shown import short
 from .knowledge import Knowledge, Known, owner_of
-from .names import MODEL, SECTIONS, Name, Use, declared_in
+from .names import MODEL, Name, Use
 from .places import Keys, Place, place_at, scalars, value_of
 from .schema import allowed, described, language
 
 _PORT = re.compile(r"(?<![\w.])(?P<actor>[A-Za-z_]\w*)(?:\[[^\]]*\])?\.(?P<port>\w*)\Z")
 # The keys of a file that name others, and of which kind those are that may be packaged; a study names a model, too.
 _FILES = {"include": "", "extends": "model"}
-
-
-@dataclass(frozen=True)
-class Symbol:
-    """Something that a file declares, and what is in it."""
-
-    name: str
-    kind: str
-    position: Position
-    inside: tuple[Symbol, ...] = ()
 
 
 def definition(knowledge: Knowledge, line: int, column: int) -> list[Position]:
@@ -174,20 +162,3 @@ def _of_place(knowledge: Knowledge, place: Place) -> Iterator[str]:
         if made is not None and hasattr(made, key):
             unit = knowledge.unit_of(owner, inner)
             yield f"value of `{made.path}`: `{shown(as_written(getattr(made, key)))}` {unit}".rstrip()
-
-
-# -- the outline ------------------------------------------------------------------------------------------------------
-
-
-def symbols(node: Node | None) -> list[Symbol]:
-    """What a file declares, section by section."""
-    if not isinstance(node, Mapping):
-        return []
-    found = []
-    for key, entry in node.entries.items():
-        inside = tuple(
-            Symbol(name, SECTIONS[key], each.key.position, tuple(symbols(each.value)) if key == "composites" else ())
-            for name, each in (declared_in(node, key, SECTIONS).items() if key in SECTIONS else ())
-        )
-        found.append(Symbol(key, "section", entry.key.position, inside))
-    return found

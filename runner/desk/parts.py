@@ -116,7 +116,7 @@ def rendered(text: str, after: Any) -> str:
         document = yaml_edit.Document.parse(text.removeprefix(head))
         _write(document, before, after, ())
         changed = head + str(document)
-    except yaml_edit.YamlError:
+    except (yaml_edit.YamlError, LookupError):  # something is other to it than to us
         changed = text
     if _canonical(data_of(changed)) != _canonical(after):
         raise EditError("this text is written in a way that no program can change here: change it by hand")
@@ -129,7 +129,7 @@ def _write(place: Any, before: Any, after: Any, keys: Keys) -> None:
         new = _kept(after)
         for key, value in new.items():
             if key not in before:
-                _add(place, key, _node(value, place, key))
+                place.set(key, _node(value, place, key), field_order=_ORDER)
             elif _canonical(before[key]) != _canonical(value):
                 _replace(place, key, before[key], value, (*keys, key))
         for key in [each for each in _kept(before) if each not in new]:
@@ -155,16 +155,6 @@ def _replace(place: Any, key: str | int, before: Any, after: Any, keys: Keys) ->
         _write(node.as_mapping() or node.as_sequence(), before, after, keys)
     else:
         place.set(key, _node(after, place, key))
-
-
-def _add(place: Any, key: str, node: Any) -> None:
-    """Another entry in a mapping: behind the others, or where keys have an order."""
-    earlier = _ORDER[: _ORDER.index(key)] if key in _ORDER else ()
-    before = next((each for each in reversed(place.keys()) if str(each) in earlier), None)
-    if before is None:
-        place.set(key, node)
-    else:
-        place.insert_after(before, key, node)
 
 
 def _node(value: Any, place: Any, key: str | int = 0) -> Any:

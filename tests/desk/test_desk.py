@@ -8,11 +8,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from lsprotocol import types as lsp
 
 from epicycle.runner.desk import Knowledge, read
+from epicycle.runner.desk.answers import Answers
 from epicycle.runner.desk.changes import RenameError, apply, edits_between, fix_all, rename, texts_after
 from epicycle.runner.desk.completion import complete
-from epicycle.runner.desk.meaning import definition, hover, links, references, symbols
+from epicycle.runner.desk.meaning import definition, hover, links, references
 from epicycle.runner.interface.cli import main
 from epicycle.runner.model.build.load import load_model
 from epicycle.runner.model.text.kinds import KINDS, Kind
@@ -277,15 +279,18 @@ def test_links_lead_to_the_files_that_are_named(tmp_path: Path) -> None:
 
 
 def test_symbols() -> None:
-    found = symbols(read(MODELS / NAME).nodes[str(MODELS / NAME)])
+    answers, path = Answers(), MODELS / NAME
+    answers.change(path, path.read_text(encoding="utf-8"))
+    document = lsp.TextDocumentIdentifier(path.resolve().as_uri())
+    found = answers.ask(lsp.TEXT_DOCUMENT_DOCUMENT_SYMBOL, lsp.DocumentSymbolParams(document))
     assert [each.name for each in found] == [
         "model", "doc", "include", "parameters", "composites", "actors", "connections", "run", "aspects", "monitors",
         "metrics", "figures",
     ]  # fmt: skip
     composites = next(each for each in found if each.name == "composites")
-    assert [each.name for each in composites.inside] == ["RadioRobot", "Main", "Observer"]
-    inside = next(each for each in composites.inside[1].inside if each.name == "actors")
-    assert [(each.name, each.kind) for each in inside.inside] == [("legs", "actor"), ("controller", "actor")]
+    assert [each.name for each in composites.children] == ["RadioRobot", "Main", "Observer"]
+    inside = next(each for each in composites.children[1].children if each.name == "actors")
+    assert [(each.name, each.detail) for each in inside.children] == [("legs", "actor"), ("controller", "actor")]
 
 
 # -- names ------------------------------------------------------------------------------------------------------------
