@@ -63,23 +63,28 @@ class Trajectory:
         """Start a solution at ``time`` ns plus a fraction of a nanosecond in s, so that no rounding accumulates over
         crossings."""
         self.time, self.fraction = time, fraction
+        self._function, exact = None, self._exact(state)
+        texts = self._translate(state) if exact is None else ()
+        self.solution = Solution(self._rates, self._bounds_of_rates, state, self.guards, **self._solver, exact=exact)
+        if texts and isinstance(stepper := self.solution.stepper, RungeKutta):
+            since = 0, *self.since.values()
+            if (functions := _unrolled(stepper.tableau, texts, len(since), len(self._fixed))) is not None:
+                origins = [(self.time - each) / NANOSECONDS_PER_SECOND for each in since]
+                stepper.unroll(Unrolled(*functions, (self.fraction, origins, self._fixed)))
+
+    def _translate(self, state: State) -> tuple[str, ...]:
+        """Make a function of the derivatives, if all that they use are floats; returns their texts."""
         used = [name for name in self._held if name in self._named]
         self._fixed = [
             float(value) if type(value) is int and abs(value) <= _EXACT else value
             for value in map(self._held.__getitem__, used)
         ]
-        self._function, exact, translated = None, self._exact(state), None
-        if exact is None and all(type(value) is float for value in (*state, *self._fixed)):
-            sources = tuple(formula.source for formula in self._formulas.values())
-            translated = all_translated(sources, ("time", *self.since, *self.names, *used))
-        if translated is not None:
-            self._function, texts = translated
-        self.solution = Solution(self._rates, self._bounds_of_rates, state, self.guards, **self._solver, exact=exact)
-        if translated is not None and isinstance(stepper := self.solution.stepper, RungeKutta):
-            since = 0, *self.since.values()
-            if (functions := _unrolled(stepper.tableau, texts, len(since), len(used))) is not None:
-                origins = [(self.time - each) / NANOSECONDS_PER_SECOND for each in since]
-                stepper.unroll(Unrolled(*functions, (self.fraction, origins, self._fixed)))
+        if not all(type(value) is float for value in (*state, *self._fixed)):
+            return ()
+        sources = tuple(formula.source for formula in self._formulas.values())
+        found = all_translated(sources, ("time", *self.since, *self.names, *used))
+        self._function, texts = found or (None, ())
+        return texts
 
     def _exact(self, state: State) -> Exact | None:
         """The solution, if every derivative is linear in its own state and depends on nothing else that moves."""

@@ -24,7 +24,7 @@ def unrolled(tableau: Tableau, rates: Sequence[str], times: int, held: int) -> s
     last state, and the norms of the errors; ``dense`` the rows of the polynomial.  They give None where a derivative
     raises one of ``UNDECIDED``.
     """
-    if len(rates) > _MOST_STATES or sum(map(len, rates)) > _MOST_TEXT:
+    if len(rates) > _MOST_STATES or len("".join(rates)) > _MOST_TEXT:
         return ""
     writer = _Writer(rates, times, held)
     late = 1 + len(tableau.stages)

@@ -11,14 +11,9 @@ from ..expression import Formula
 from ..expression.syntax import free_names, parse
 
 TIMES: Final = ("time", "mode_time")
-_ON_SIDE: Final[dict[type[ast.cmpop], Callable[[int], bool]]] = {
-    ast.Lt: lambda side: side < 0,
-    ast.LtE: lambda side: side <= 0,
-    ast.Gt: lambda side: side > 0,
-    ast.GtE: lambda side: side >= 0,
-    ast.Eq: lambda side: side == 0,
-    ast.NotEq: lambda side: side != 0,
-}
+_ON_SIDES: Final[dict[type[ast.cmpop], tuple[int, ...]]] = {
+    ast.Lt: (-1,), ast.LtE: (-1, 0), ast.Gt: (1,), ast.GtE: (0, 1), ast.Eq: (0,), ast.NotEq: (-1, 1),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +32,7 @@ class Comparison:
         return self.sign in (ast.Eq, ast.NotEq)
 
     def holds(self, side: int) -> bool:
-        return _ON_SIDE[self.sign](side)
+        return side in _ON_SIDES[self.sign]
 
 
 @dataclass(frozen=True)
@@ -62,7 +57,7 @@ def condition_of(guard: Formula, moving: Collection[str], numbers: Collection[st
         written = [source[part.col_offset : part.end_col_offset] for part in parts]
         stand_ins = []
         for place, sign in enumerate(node.ops):
-            if type(sign) not in _ON_SIDE:
+            if type(sign) not in _ON_SIDES:
                 break
             name = f"_comparison_{taken + len(found) + place}"
             difference = Formula(f"({written[place]}) - ({written[place + 1]})")
