@@ -39,11 +39,12 @@ LOCAL = (
     "the obstacle"
 )
 
-Recorded = tuple[Any, np.ndarray, Barrier]
+# A problem as the kernels take it, starts, and what solves it as far as its scenario asks for.
+Recorded = tuple[Any, np.ndarray, Callable[[Any, np.ndarray], Any]]
 
 
 def record(count: int) -> list[Recorded]:
-    """Problems with their starts and actors, evenly from runs under all conditions."""
+    """Problems, evenly from runs under all conditions."""
     conditions = [{"disturbance": level, "observers": observers} for level in (0.0, 0.5) for observers in range(5)]
     found = recorded("collision_avoidance", conditions)
     return [found[i] for i in np.linspace(0, len(found) - 1, count).astype(int)]
@@ -55,7 +56,8 @@ def recorded(name: str, conditions: list[dict[str, Any]]) -> list[Recorded]:
     solve = Barrier.solve
 
     def note(self: Barrier, problem: Any, starts: np.ndarray) -> Any:
-        found.append((problem, starts, self))
+        numbers_of, solved = self._kernels
+        found.append((numbers_of(problem), starts, solved))
         return solve(self, problem, starts)
 
     Barrier.solve = note  # type: ignore[method-assign]
@@ -134,7 +136,7 @@ def stops() -> Iterator[Row]:
     problems = record(PROBLEMS)
     names = "a gap of 1e-5", "the scenario's stop"
     steps = {
-        name: sum((barrier.solve(p, s) if name is names[0] else own.solve(p, s)).iterations for p, s, own in problems)
+        name: sum((barrier.solve(p, s) if name is names[0] else own(p, s)).iterations for p, s, own in problems)
         for name in names
     }
 
@@ -143,7 +145,7 @@ def stops() -> Iterator[Row]:
             if name is names[0]:
                 barrier.solve(problem, starts)
             else:
-                own.solve(problem, starts)
+                own(problem, starts)
 
     results = take_turns({name: lambda name=name: cpu_seconds(lambda: solve(name)) / PROBLEMS for name in names}, 7)
     most, least = (steps[name] / PROBLEMS for name in names)
@@ -165,7 +167,7 @@ def several_obstacles() -> Iterator[Row]:
     posed = {names[0]: problems, names[1]: [(nearest(problem), starts, own) for problem, starts, own in problems]}
 
     def middle(name: str) -> float:
-        return median(seconds(lambda p=p, s=s, own=own: own.solve(p, s))[0] for p, s, own in posed[name])
+        return median(seconds(lambda p=p, s=s, own=own: own(p, s))[0] for p, s, own in posed[name])
 
     results = take_turns({name: lambda name=name: middle(name) for name in names}, 7)
     ratio = median(results[names[0]]) / median(results[names[1]])
@@ -176,9 +178,7 @@ def several_obstacles() -> Iterator[Row]:
     text = f"{ratio:.2f}x ({1000 * median(results[names[0]]):.3f} against {1000 * median(results[names[1]]):.3f} ms)"
     yield Row("horizon problem, five obstacles", "one obstacle", text, "<= 3x", ratio <= 3.0, how)
     crowd = recorded("many_obstacles", [{"obstacles": 5, "observers": 7}])
-    rounds = [
-        median(seconds(lambda p=p, s=s, own=own: own.solve(p, s))[0] for p, s, own in crowd) for _ in range(ROUNDS)
-    ]
+    rounds = [median(seconds(lambda p=p, s=s, own=own: own(p, s))[0] for p, s, own in crowd) for _ in range(ROUNDS)]
     how = f"{len(crowd)} problems recorded from two runs of many_obstacles with 7 observers; median of {ROUNDS} rounds"
     took = 1000 * median(rounds)
     yield Row("horizon problem, eight robots, five obstacles", "", f"{took:.3f} ms", "< 2 ms", took < 2.0, how)

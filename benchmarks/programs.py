@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from epicycle.actors.robotics.numerics.definitions import violations
+from epicycle.actors.robotics.numerics import definitions
 from epicycle.actors.robotics.numerics.horizon import INFORM, HorizonProblem, trajectory
 
 Array = NDArray[np.float64]
@@ -235,6 +235,13 @@ PEERS: dict[str, Solve] = {
 
 
 # --- the value of a plan ------------------------------------------------------------------------------
+
+
+def violations(problem: HorizonProblem, controls: Array) -> Array:
+    """f3-f5 of a plan, a row each, from their definitions."""
+    places = trajectory(problem.position, problem.velocity, controls, problem.period, len(controls))
+    found: Array = definitions.constraints(problem, places)
+    return found
 
 
 def bounds_of(problem: HorizonProblem, controls: Array, slack: float = 1e-4) -> Array:

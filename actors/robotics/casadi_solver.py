@@ -1,8 +1,8 @@
 """A horizon problem as a nonlinear program for CasADi; loaded only when requested.
 
-The program is the problem's own methods on symbols: for the paper's robots ``numerics.definitions``, independent of the
-barrier method's code, so that the two can check each other; for others their ``Dynamics`` and ``Objective``.  A
-``positive`` part is exact: each max(0, x) is a variable t with t >= 0 and t >= x.
+The program is the problem's own methods on symbols: ``numerics.definitions``, its ``Dynamics`` and its ``Objective``.
+They are independent of the barrier method's code, so that the two can check each other.  A ``positive`` part is exact:
+each max(0, x) is a variable t with t >= 0 and t >= x.
 
 An infeasible problem is solved in two stages, as the barrier method does: the sum of the squared violations
 of the constraints is minimised first; then the cost, with each constraint bounded by its own least violation.
@@ -18,8 +18,8 @@ import numpy as np
 
 from ..core import EpicycleError
 from .arrays import Array
-from .numerics.horizon import FAR, TOLERANCE, Solution
-from .problem import Problem
+from .numerics.horizon import TOLERANCE, Solution
+from .problem import FAR, Problem
 
 _SLACK = 1e-4  # m; added to the second stage's bounds, so that they have an interior
 _STRICT = 1e-6  # by which limits are kept, as the solver keeps its bounds up to a tolerance
@@ -53,7 +53,7 @@ def load_casadi(plugin: str = "ipopt") -> Any:
     return casadi
 
 
-def solve(problem: Any, starts: Array, max_iterations: int = 500, method: str = "ipopt") -> Solution:
+def solve(problem: Problem, starts: Array, max_iterations: int = 500, method: str = "ipopt") -> Solution:
     """Solve from ``starts[0]`` (k, N, m); never raises."""
     attempt = _Attempt(problem, starts.shape[1:], max_iterations, method)
     candidates = [start for start in starts if attempt.keeps_limits(start)]
@@ -72,22 +72,16 @@ def solve(problem: Any, starts: Array, max_iterations: int = 500, method: str = 
                 controls = restored
     if controls is None:
         controls = min(candidates, key=attempt.worst) if candidates else start
-    answer: Solution = attempt.problem.solution(controls, attempt.iterations)
-    return answer
+    return attempt.problem.solution(controls, attempt.iterations)
 
 
-def _prepared(problem: Any) -> Any:
+def _prepared(problem: Problem) -> Problem:
     """The problem without numbers that a solver cannot use: infinite ones, and points of weight 0."""
-    if isinstance(problem, Problem):
-        beliefs = problem.beliefs
-        heavy = beliefs.weights > 0.0
-        samples = beliefs.samples[np.resize(heavy, len(beliefs.samples))]
-        beliefs = beliefs._replace(samples=samples, weights=beliefs.weights[heavy])
-        return problem._replace(numbers=_prepared(problem.numbers), beliefs=beliefs)
-    return problem.weighed()._replace(
+    heavy = problem.weights > 0.0
+    return problem._replace(
+        samples=problem.samples[np.resize(heavy, len(problem.samples))],
+        weights=problem.weights[heavy],
         tube_radius=np.where(np.isfinite(problem.tube_radius), problem.tube_radius, FAR),
-        climb_speed=min(problem.climb_speed, FAR),
-        climb_acceleration=min(problem.climb_acceleration, FAR),
         lowest=max(problem.lowest, -FAR),
         highest=min(problem.highest, FAR),
     )
@@ -96,7 +90,7 @@ def _prepared(problem: Any) -> Any:
 class _Attempt:
     """One problem: its numbers, its two programs, and how many iterations they have taken."""
 
-    def __init__(self, problem: Any, shape: tuple[int, ...], max_iterations: int, method: str) -> None:
+    def __init__(self, problem: Problem, shape: tuple[int, ...], max_iterations: int, method: str) -> None:
         self.problem = _prepared(problem)
         self._parameters = np.concatenate([np.ravel(each) for each in self.problem.arrays])
         self._programs = _programs(self.problem, shape, max_iterations, method)
@@ -154,9 +148,9 @@ class _Programs(NamedTuple):
 _made: OrderedDict[Any, _Programs] = OrderedDict()  # the latest last
 
 
-def _programs(problem: Any, shape: tuple[int, ...], max_iterations: int, method: str) -> _Programs:
+def _programs(problem: Problem, shape: tuple[int, ...], max_iterations: int, method: str) -> _Programs:
     """The programs of a problem, which differ only in shapes and in what is not a number."""
-    key = type(problem), problem.key, shape, tuple(map(np.shape, problem.arrays)), max_iterations, method
+    key = problem.key, shape, tuple(map(np.shape, problem.arrays)), max_iterations, method
     if key in _made:
         _made.move_to_end(key)
     else:
@@ -166,7 +160,7 @@ def _programs(problem: Any, shape: tuple[int, ...], max_iterations: int, method:
     return _made[key]
 
 
-def _new_programs(problem: Any, shape: tuple[int, ...], max_iterations: int, method: str) -> _Programs:
+def _new_programs(problem: Problem, shape: tuple[int, ...], max_iterations: int, method: str) -> _Programs:
     cs = load_casadi(method)
     found: list[Any] = []  # what positive parts are of, and these
     options = {"print_time": False, "error_on_fail": False, f"{method}.max_iter": max_iterations, **_OPTIONS[method]}

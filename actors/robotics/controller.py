@@ -22,13 +22,12 @@ from ..core import (
     shaped,
 )
 from ..core.elementary import hypot
-from . import rolling
 from .arrays import Array, array_of, finite, floats, joined, read_only, stacked
 from .dynamics import DoubleIntegrator, Dynamics
 from .estimator import TargetModel
 from .messages import BodyState, Estimate, Plan, SampledEstimate, Tracks, enclosing
-from .planning import KNOWN, Barrier, ReachGoal, Solver
-from .problem import Beliefs, Objective, Problem
+from .planning import Barrier, ReachGoal, Solver
+from .problem import Objective, Problem
 from .receiving import EITHER, PlaceParameter, latest, received
 
 STEPS, SECONDS = "steps", "seconds"
@@ -39,10 +38,9 @@ _MADE_AT, _CONTROLS = 0, 7  # columns of a table of plans of robots in the plane
 class _Standing(NamedTuple):
     """The latest plan of the controller; one made an infinite time ago has no effect."""
 
-    made_at: float  # s, the time of its initial state
-    position: Array  # (d,) and velocity at step 1 from made_at
-    velocity: Array
-    controls: Array  # (N, d) U_{t+1} .. U_{t+N}, as seen from made_at
+    made_at: float  # s, the time before its initial state
+    state: Array  # (n,) at step 1 from made_at
+    controls: Array  # (N, m) U_{t+1} .. U_{t+N}, as seen from made_at
 
 
 class _Peers:
@@ -206,7 +204,7 @@ class RobustController(TargetModel, Actor):
         self.control.change("type", shaped(np.ndarray, (self._motion.controls,)))
 
     def initialize(self) -> None:
-        from .numerics import definitions, horizon, reachability
+        from .numerics import definitions, reachability
         from .numerics.warm_up import compile_kernels
 
         motion: Any = self._motion
@@ -219,7 +217,7 @@ class RobustController(TargetModel, Actor):
         compile_kernels(d)
         # Kept, as executing an import takes 1 us each time.
         self._standing_plan, self._peer_tubes = reachability.standing_plan, reachability.peer_tubes
-        self._expected_target, self._new_problem = reachability.expected_target, horizon.HorizonProblem
+        self._expected_target = reachability.expected_target
         self._name = self.robot_name or enclosing(self.path)
         tau = 1.0 if self.tube_time == STEPS else self.period
         # The kernels count steps from t.  From t + period on there is one more step, and tau is 0 at the first.
@@ -237,18 +235,11 @@ class RobustController(TargetModel, Actor):
         self._nobody = no_means, no_covariances, np.empty((0, d)), np.empty(0)
         places, apart = self.keep_out[:, np.newaxis, :2], self.keep_out[:, 2:]
         self._standing_there = np.repeat(places, self._steps, axis=1), np.repeat(apart, self._steps, axis=1)
-        self._bounds: dict[str, Any] = {  # by their names in the problem; those of other dynamics are their own
-            name: getattr(motion, name, math.inf)
-            for name in ("max_speed", "max_acceleration", "climb_speed", "climb_acceleration")
-        }
-        if d == 3:
-            self._bounds["lowest"] = -math.inf if self.lowest is None else self.lowest
-            self._bounds["highest"] = math.inf if self.highest is None else self.highest
-        elif self._is_papers:
-            del self._bounds["climb_speed"], self._bounds["climb_acceleration"]
+        lowest, highest = (self.lowest, self.highest) if d == 3 else (None, None)
+        self._heights = -math.inf if lowest is None else lowest, math.inf if highest is None else highest
         self._applied = self._rest  # U_t
-        first = np.zeros(d if self._is_papers else motion.states)
-        self._standing = self._nothing = _Standing(-math.inf, first, np.zeros(d), np.zeros((self._steps, size)))
+        nowhere, nothing = np.zeros(motion.states), np.zeros((self._steps, size))
+        self._standing = self._nothing = _Standing(-math.inf, nowhere, nothing)
         own = None if self.start is None else self.start.tolist()
         self._peers = _Peers([place for place in self.peers_at_start.tolist() if place != own])
         self._objective: Objective = self.objective
@@ -297,67 +288,48 @@ class RobustController(TargetModel, Actor):
             if tracks.finite and (self._tracks is None or tracks.time >= self._tracks.time):
                 self._tracks = tracks
 
-    def _send(self, own: BodyState, problem: Any, controls: Array) -> None:
+    def _send(self, own: BodyState, problem: Problem, controls: Array) -> None:
+        self._standing = _Standing(own.time, problem.state, controls)
+        told = own
         if self._is_papers:
-            numbers, told = getattr(problem, "numbers", problem), own
-            self._standing = _Standing(own.time, numbers.position, numbers.velocity, controls)
             accelerations = joined(floats(self._applied), controls[: self.horizon]).reshape(self.horizon + 1, self._d)
         else:
-            self._standing = _Standing(own.time, problem.state, self._rest, controls)
-            told, accelerations = rolling.announced(own, problem.trajectory(controls).positions, self.period)
+            told, accelerations = self._motion.announced(own, problem.state, controls, self.period)
         self.plan.send(Plan(self._name, own.time, told, accelerations))
         self._applied = read_only(controls[0])
         self.control.send(self._applied)
 
     # --- the problem ------------------------------------------------------------------------------------
 
-    def _problem(self, own: BodyState) -> tuple[Any, Array]:
+    def _problem(self, own: BodyState) -> tuple[Problem, Array]:
         """The problem, and the starts of its solver (2, N, m): the standing plan from the next period on; braking."""
-        now, period, standing = own.time, self.period, self._standing
+        now, period, d = own.time, self.period, self._d
+        made_at, begun, controls = self._standing
         if self._is_papers:
             # Floats: arithmetic on arrays of two takes ten times as long.
             place, moving, pushed = floats(own.position), floats(own.velocity), floats(self._applied)
-            position = array_of(tuple([p + period * v for p, v in zip(place, moving, strict=True)]))
+            place = tuple([p + period * v for p, v in zip(place, moving, strict=True)])
             moving = tuple([v + period * u for v, u in zip(moving, pushed, strict=True)])
-            velocity, (speed, most) = array_of(moving), self._braking(moving)
+            state, (speed, most) = array_of((*place, *moving)), self._braking(moving)
             tube_centre, tube_radius, starts = self._standing_plan(
-                *standing[1:], now - standing.made_at, self._radius, velocity, speed, most, period
+                begun[:d], begun[d:], controls, now - made_at, self._radius, state[d:], speed, most, period
             )
         else:
-            state = rolling.next_state(self._motion, own, self._applied, period)
-            position, velocity = state[: self._d], np.array(self._motion.velocity(state))
-            tube_centre, tube_radius, starts = rolling.standing_plan(
-                self._motion, standing.position, standing.controls, now - standing.made_at, self._radius, state, period
+            state = self._motion.next_state(own, self._applied, period)
+            tube_centre, tube_radius, starts = self._motion.standing_plan(
+                begun, controls, now - made_at, self._radius, state, period
             )
-        target_mean, target_covariance, points, weights = self._expected(now)
-        peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room, self._d)
-        posed = self._new_problem(
-            period=period,
-            position=position,
-            velocity=velocity,
-            tube_centre=tube_centre,
-            tube_radius=tube_radius,
-            safe_distance=self.safe_distance,
-            margin=self.margin,
-            obstacle_mean=target_mean,
-            obstacle_covariance=target_covariance,
-            peer_mean=peer_mean,
-            peer_distance=peer_distance,
-            **self._bounds,
-        )
-        is_known = self._is_papers and type(self._objective) in KNOWN
-        if is_known:
-            posed = self._objective.pose(posed, points, weights, self._peers.names)
+        obstacle_mean, obstacle_covariance, samples, weights = self._expected(now)
+        peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room, d)
         if len(self.keep_out):  # as f5, but nobody who measures
             there, apart = self._standing_there
-            posed = posed._replace(
-                peer_mean=np.concatenate((peer_mean, there)), peer_distance=np.concatenate((peer_distance, apart))
-            )
-        if is_known:
-            return posed, starts
-        beliefs = Beliefs(target_mean, target_covariance, points, weights, peer_mean, self._peers.names)
-        state = np.concatenate((position, velocity)) if self._is_papers else state
-        return Problem(posed, state, self._motion, self._objective, beliefs), starts
+            peer_mean, peer_distance = np.concatenate((peer_mean, there)), np.concatenate((peer_distance, apart))
+        problem = Problem(
+            self._motion, self._objective, self._peers.names, period, state, tube_centre, tube_radius,
+            self.safe_distance, self.margin, obstacle_mean, obstacle_covariance, peer_mean, peer_distance, samples,
+            weights, *self._heights,
+        )  # fmt: skip
+        return problem, starts
 
     def _expected(self, now: float) -> tuple[Array, ...]:
         """Means (K, N, d) and covariances (K, N, d (d + 1) / 2) of all targets, sigma points of each (K M, d) and their
@@ -394,12 +366,12 @@ class RobustController(TargetModel, Actor):
 
     def _braking(self, velocity: tuple[float, ...]) -> tuple[float, float]:
         """The speed, and the largest acceleration against it."""
-        bounds = self._bounds
-        level, most = hypot(velocity[0], velocity[1]), bounds["max_acceleration"]
+        motion: Any = self._motion
+        level, most = hypot(velocity[0], velocity[1]), motion.max_acceleration
         if len(velocity) == 2:
             return level, most
         speed = hypot(level, velocity[2])
         if not 0.0 < speed < math.inf:
             return speed, most
-        weighted = hypot(level, velocity[2] * (most / bounds["climb_acceleration"]))
+        weighted = hypot(level, velocity[2] * (most / motion.climb_acceleration))
         return speed, most * (speed / weighted)

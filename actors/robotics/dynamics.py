@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from ..core import Configurable, Parameter
 from ..core.elementary import hypot
-from .arrays import array_of, floats
+from .arrays import Array, array_of, floats
 from .messages import BodyState, MotionState
 from .receiving import MessageError
 
@@ -85,6 +86,38 @@ class Dynamics(Configurable):
             states.append(np.array(self.step(states[-1], control, period)))
         return np.stack(states)
 
+    # --- what a controller does with it -----------------------------------------------------------------
+
+    def next_state(self, own: BodyState, applied: Array, period: float) -> Array:
+        """The state (n,) a period after that of a token."""
+        return np.array(self.step(self.state_of(own), floats(applied), period), dtype=float)
+
+    def standing_plan(
+        self, state: Array, controls: Array, elapsed: float, radius: Array, now: Array, period: float
+    ) -> tuple[Array, Array, Array]:
+        """The use of a plan from ``state`` (n,) with ``controls`` (N, m), ``elapsed`` seconds later, as
+        ``reachability.standing_plan``: centres (N, d) and radii (N,) of the tube around it, and the starts of a solver
+        (2, N, m): the plan, and braking from the state ``now``."""
+        steps = len(radius)
+        age = round(min(max(elapsed / period, 0.0), steps))
+        centres, radii = np.zeros((steps, self.dimensions)), np.full(steps, math.inf)
+        starts = np.zeros((2, *controls.shape))
+        left = steps - age
+        if left:
+            centres[:left] = self.trajectory(state, controls, period)[age:, : self.dimensions]
+            radii[:left], starts[0, :left] = radius[:left], controls[age:]
+        for s in range(steps):
+            starts[1, s] = self.braking(now, period)
+            now = np.array(self.step(now, starts[1, s], period), dtype=float)
+        return centres, radii, starts
+
+    def announced(self, own: BodyState, state: Array, controls: Array, period: float) -> tuple[BodyState, Array]:
+        """A plan from the ``state`` at the next step, as others take it: the state and the accelerations of a double
+        integrator that is at the same places."""
+        positions = self.trajectory(state, controls, period)[:, : self.dimensions]
+        velocities = np.diff(np.vstack([own.position, positions]), axis=0) / period
+        return BodyState(own.position, velocities[0], own.time), np.diff(velocities, axis=0) / period
+
 
 class DoubleIntegrator(Dynamics):
     """The paper's robot, eq. (2): the control is the acceleration, and the state is position and velocity.
@@ -104,9 +137,9 @@ class DoubleIntegrator(Dynamics):
         self.states, self.controls = 2 * self.dimensions, self.dimensions
 
     def step(self, state: Numbers, control: Numbers, period: float) -> Numbers:
-        d = self.dimensions
-        moved = [state[i] + period * state[d + i] for i in range(d)]
-        return [*moved, *[state[d + i] + period * control[i] for i in range(d)]]
+        from .numerics.definitions import dynamics
+
+        return dynamics(state, control, period)
 
     def state_limits(self, state: Numbers) -> Numbers:
         from .numerics.definitions import f1

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -50,8 +51,8 @@ class ReachGoal(Objective):
 
         return f0(trajectory.positions, in_space(self.goal, trajectory.positions.shape[1])).sum()
 
-    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
-        return problem.to_reach(in_space(self.goal, len(problem.position)))
+    def pose(self, problem: Problem) -> dict[str, Any]:
+        return {"goal": in_space(self.goal, problem.dynamics.dimensions)[np.newaxis]}
 
 
 class _Weights(MappingParameter):
@@ -85,17 +86,17 @@ class StayNear(Objective):
     def cost(self, trajectory: Trajectory, beliefs: Beliefs) -> Any:
         from .numerics.definitions import f0
 
-        goal = self._goal(trajectory.positions[0], beliefs.names, beliefs.peers, beliefs.targets)
-        return f0(trajectory.positions, goal).sum()
+        return f0(trajectory.positions, self._goal(trajectory.positions[0], beliefs)).sum()
 
-    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
-        return problem.to_reach(self._goal(problem.position, peers, problem.peer_mean, problem.obstacle_mean))
+    def pose(self, problem: Problem) -> dict[str, Any]:
+        here = problem.state[: problem.dynamics.dimensions]
+        return {"goal": np.atleast_2d(self._goal(here, problem.beliefs))}
 
-    def _goal(self, here: Any, names: Sequence[str], peers: Any, targets: Any) -> Any:
+    def _goal(self, here: Any, beliefs: Beliefs) -> Any:
         """Where to be, at each step (N, d) or always (d,)."""
         from .numerics.definitions import common_goal
 
-        known = dict(zip((*names, TARGET), (*peers, *targets[:1]), strict=False))
+        known = dict(zip((*beliefs.names, TARGET), (*beliefs.peers, *beliefs.targets[:1]), strict=False))
         near = [name for name in self.to if name in known]
         if not near:
             return here
@@ -136,9 +137,36 @@ class Inform(Objective):
             total = total - information + (self._gamma * too_far).sum()
         return total
 
-    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
-        others = problem.peer_mean if self.joint else problem.peer_mean[:0]
-        return problem.to_inform(points, weights, others, self.variance, self._gamma, self.range, self.across)
+    def pose(self, problem: Problem) -> dict[str, Any]:
+        """With ``across``, what two points differ by across the line of sight is the rest of their distance, which no
+        robot's place changes: it counts as a constant, and ranges by as much more as they say more."""
+        (kind, exponents), beliefs = self._kernels, problem.beliefs
+        others, variance, across = beliefs.peers if self.joint else beliefs.peers[:0], self.variance, self.across
+        if across is not None:
+            variance = math.inf if variance == across else 1.0 / (1.0 / variance - 1.0 / across)
+        distances = []
+        for points in beliefs.samples_by_target:
+            distance = exponents(points, others, variance)
+            if across is not None:
+                robots, offsets = len(others) + 1, points[:, np.newaxis] - points
+                for c in range(points.shape[1]):
+                    distance = distance + robots * offsets[:, :, c] * offsets[:, :, c] / (2.0 * across)
+            distances.append(distance)
+        return {
+            "objective": kind,
+            "sigma_positions": beliefs.samples,
+            "sigma_weights": beliefs.weights,
+            "others_distance": distances[0] if len(distances) == 1 else np.concatenate(distances or [np.empty((0, 0))]),
+            "measurement_variance": variance,
+            "range_penalty": self._gamma,
+            "measurement_range": self.range,
+        }
+
+    @cached_property
+    def _kernels(self) -> tuple[int, Callable[..., Array]]:
+        from .numerics import horizon, mutual_information
+
+        return horizon.INFORM, mutual_information.pairwise_distance
 
     @property
     def _gamma(self) -> float:
@@ -172,7 +200,7 @@ class Solver(Configurable):
         """Why it cannot solve problems with these; empty if it can."""
         return ""
 
-    def solve(self, problem: Problem | HorizonProblem, starts: Array) -> Solution:
+    def solve(self, problem: Problem, starts: Array) -> Solution:
         """The best plan found from ``starts`` (k, N, m), of which the last one brakes; never raises, and finite for
         finite input."""
         raise NotImplementedError
@@ -215,15 +243,16 @@ class Barrier(Solver):
         )
 
     @cached_property
-    def _solve(self) -> Callable[[HorizonProblem, Array], Solution]:
-        from .numerics import barrier
+    def _kernels(self) -> tuple[Callable[[Problem], HorizonProblem], Callable[[HorizonProblem, Array], Solution]]:
+        from .numerics import barrier, horizon
 
         answers = {"progress": barrier.PROGRESS, "least_violation": barrier.LEAST_VIOLATION, "brake": barrier.BRAKE}
         rules = barrier.Rules(self.gap, self.last_parameter, self.free_controls, answers[self.infeasible])
-        return partial(barrier.solve, rules=rules)
+        return horizon.numbers_of, partial(barrier.solve, rules=rules)
 
-    def solve(self, problem: Any, starts: Array) -> Solution:
-        return self._solve(problem, starts)
+    def solve(self, problem: Problem, starts: Array) -> Solution:
+        numbers_of, solve = self._kernels
+        return solve(numbers_of(problem), starts)
 
 
 class Casadi(Solver):
@@ -242,7 +271,7 @@ class Casadi(Solver):
 
         load_casadi(self.method)
 
-    def solve(self, problem: Problem | HorizonProblem, starts: Array) -> Solution:
+    def solve(self, problem: Problem, starts: Array) -> Solution:
         from .casadi_solver import solve
 
         return solve(problem, starts, self.max_iterations, self.method)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,7 +13,9 @@ from .arrays import Array
 
 if TYPE_CHECKING:
     from .dynamics import Dynamics
-    from .numerics.horizon import HorizonProblem, Solution
+    from .numerics.horizon import Solution
+
+FAR = 1e6  # m; infinity for solvers, to which inf - inf is no number
 
 
 class Beliefs(NamedTuple):
@@ -58,45 +61,58 @@ class Objective(Configurable):
     def check_dimensions(self, dimensions: int) -> None:
         """Raise ``ParameterError`` if it is not for a robot with so many dimensions."""
 
-    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
-        """The problem with this objective, for the compiled kernels.
-
-        ``points`` (T M, 2) are the sigma points of T targets at the end of the horizon, one target after the other,
-        each with the ``weights`` (M,).  T = 0 while no target is known.  ``peers`` are the names of the robots in the
-        problem, in its order.
-        """
+    def pose(self, problem: Problem) -> dict[str, Any]:
+        """The fields of a ``HorizonProblem`` that say this objective to the compiled kernels."""
         raise NotImplementedError
 
 
 class Problem(NamedTuple):
     """A plan to be found: controls (N, m) for steps 1..N of the horizon, of which the last one changes no state.
 
-    What is to be kept is in the ``numbers``: tube, obstacles and peers.  ``state`` is that at step 1.
+    It keeps to its tube, and away from the obstacles, which are the targets, and the peers; at the end of these may be
+    some without a name, who only stand in the way.
     """
 
-    numbers: HorizonProblem
-    state: Array
     dynamics: Dynamics
     objective: Objective
-    beliefs: Beliefs
+    names: tuple[str, ...]  # of the first peers
+    period: float  # s
+    state: Array  # (n,) at step 1
+    tube_centre: Array  # (N, d) m
+    tube_radius: Array  # (N,) m; inf where the tube is free
+    safe_distance: float  # m, to keep from the obstacles, and besides
+    margin: float  # standard deviations
+    obstacle_mean: Array  # (T, N, d) m
+    obstacle_covariance: Array  # (T, N, d (d + 1) / 2) m^2
+    peer_mean: Array  # (n, N, d) m
+    peer_distance: Array  # (n, N) m, to keep from them
+    samples: Array  # (T M, d) of the ``beliefs``
+    weights: Array  # (M,)
+    lowest: float = -math.inf  # m, in space, the height to stay above
+    highest: float = math.inf  # m, in space, the height to stay below
+
+    @property
+    def beliefs(self) -> Beliefs:
+        """What the objective is given of the others."""
+        peers = self.peer_mean[: len(self.names)]
+        return Beliefs(self.obstacle_mean, self.obstacle_covariance, self.samples, self.weights, peers, self.names)
 
     def trajectory(self, controls: Any, positive: Callable[[Any], Any] | None = None) -> Trajectory:
         """The states under controls (N, m)."""
-        states = self.dynamics.trajectory(self.state, controls, self.numbers.period)
-        made = Trajectory(states, states[:, : self.dynamics.dimensions], controls, self.numbers.period)
+        states = self.dynamics.trajectory(self.state, controls, self.period)
+        made = Trajectory(states, states[:, : self.dynamics.dimensions], controls, self.period)
         return made if positive is None else made._replace(positive=positive)
 
     def cost(self, controls: Any, positive: Callable[[Any], Any] | None = None) -> Any:
-        """What is to be minimised."""
+        """What is to be minimised; ``positive`` may replace max(0, .)."""
         return self.objective.cost(self.trajectory(controls, positive), self.beliefs)
 
     def constraints(self, controls: Any) -> Any:
         """Lengths in m that are <= 0 if the plan keeps off obstacles and peers, and in its tube: f3 to f5, and f7."""
         from .numerics.definitions import constraints
-        from .numerics.horizon import within_reach
 
-        positions = self.trajectory(controls).positions
-        return within_reach(constraints(self.numbers, positions, self.dynamics.decided).ravel())
+        values = constraints(self, self.trajectory(controls).positions, self.dynamics.decided).ravel()
+        return values if values.dtype == object else np.maximum(values, -FAR)
 
     def limits(self, controls: Any) -> Any:
         """Numbers that are <= 0 if the robot can do it: those of the dynamics, of all states but the first, which is
@@ -108,26 +124,26 @@ class Problem(NamedTuple):
 
     def solution(self, controls: Array, iterations: int = 0) -> Solution:
         """The answer of a solver, with its violation of the constraints and its cost."""
-        from .numerics.horizon import solution
+        from .numerics.horizon import TOLERANCE, Solution
 
-        return solution(self, controls, iterations)
+        worst = float(np.max(self.constraints(controls), initial=0.0))
+        return Solution(controls, worst if worst > TOLERANCE else 0.0, float(self.cost(controls)), iterations)
 
     # --- for solvers that work on symbols ---------------------------------------------------------------
 
     @property
-    def arrays(self) -> list[Any]:
+    def arrays(self) -> tuple[Any, ...]:
         """All numbers."""
-        return [self.state, *self.numbers.arrays, *self.beliefs[:5]]
+        return self[3:]
 
     @property
     def key(self) -> Any:
         """What else there is."""
-        return self.numbers.key, _told(self.dynamics), _told(self.objective), self.beliefs.names
+        return _told(self.dynamics), _told(self.objective), self.names
 
     def of(self, arrays: Sequence[Any]) -> Problem:
         """The same problem of other numbers, or of symbols."""
-        beliefs = Beliefs(*arrays[-5:])._replace(names=self.beliefs.names)
-        return self._replace(state=arrays[0], numbers=self.numbers.of(arrays[1:-5]), beliefs=beliefs)
+        return Problem(self.dynamics, self.objective, self.names, *arrays)
 
 
 def _told(value: Any) -> Any:

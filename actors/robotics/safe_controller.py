@@ -17,7 +17,7 @@ from .messages import BodyState
 from .receiving import PLANE
 
 if TYPE_CHECKING:
-    from .numerics.horizon import HorizonProblem
+    from .problem import Problem
 
 _DIRECTIONS = 64  # of a retreat that are tried
 _SHARES = 1.0, 0.75, 0.5, 0.25  # of the planned control, the rest being that of the retreat
@@ -93,11 +93,11 @@ class SafeController(IntegratedOU, RobustController):
         points, weights = self._sigma_points(*self._predict(mean, covariance, *self.motion(steps * period)), kappa)
         return means[np.newaxis], covariances[np.newaxis], points[:, :2].copy(), weights
 
-    def _problem(self, own: BodyState) -> tuple[HorizonProblem, Array]:
+    def _problem(self, own: BodyState) -> tuple[Problem, Array]:
         problem, starts = super()._problem(own)
         return problem._replace(margin=self.sigma_margin), starts
 
-    def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
+    def _send(self, own: BodyState, problem: Problem, controls: Array) -> None:
         if self._targets():
             first = self._safe(own.time, problem, controls[0])
             if first is not controls[0] and (first != controls[0]).any():
@@ -109,9 +109,9 @@ class SafeController(IntegratedOU, RobustController):
 
     # --- retreats ---------------------------------------------------------------------------------------
 
-    def _safe(self, now: float, problem: HorizonProblem, planned: Array) -> Array:
+    def _safe(self, now: float, problem: Problem, planned: Array) -> Array:
         """The control to send in place of the planned one: itself, if it leaves a retreat."""
-        start, last = (problem.position, problem.velocity), self._retreat
+        start, last = (problem.state[:2], problem.state[2:]), self._retreat
         reaches = np.full(_DIRECTIONS, -math.inf)  # of the target that reaches farthest in each direction
         for target in self._targets():
             estimate = target.mean.copy(), target.covariance.copy(), max(now - target.time, 0.0)

@@ -17,8 +17,7 @@ import numpy as np
 
 from .compiled import Array
 
-REACH_GOAL, INFORM = 0, 1  # the kinds of objectives: eq. (2), eq. (5)
-Posed: TypeAlias = Any  # a ``HorizonProblem``, whose cost and constraints are these definitions
+Posed: TypeAlias = Any  # a ``Problem``
 
 _TINY = 1e-18  # m^2; gives a root a slope also at zero, and changes it by less than 1e-9 m
 
@@ -39,17 +38,14 @@ def measured_range(target: Any, robot: Any) -> Any:
     return _norm(target - robot)
 
 
-def dynamics(position: Any, velocity: Any, controls: Any, period: Any) -> tuple[Any, Any]:
-    """The equality constraint of eq. (2): positions and velocities (N, d) at steps 1..N.
+def dynamics(state: Any, control: Any, period: Any) -> Any:
+    """The equality constraint of eq. (2): the state (P, V) a period after another one, under the control U, in m/s^2.
 
-    They begin with ``position`` Pr_{t+1} and ``velocity`` V_{t+1} (d,), which no unknown control can change; the row of
-    ``controls`` (N, d) for step s is U_{t+s}, in m/s^2.
+    The first state of a horizon is (Pr_{t+1}, V_{t+1}), which no unknown control can change; then U_{t+1} acts.
     """
-    positions, velocities = [position], [velocity]
-    for control in controls[:-1]:
-        positions.append(positions[-1] + period * velocities[-1])
-        velocities.append(velocities[-1] + period * control)
-    return np.stack(positions), np.stack(velocities)
+    d = len(control)
+    moved = [state[i] + period * state[d + i] for i in range(d)]
+    return [*moved, *[state[d + i] + period * control[i] for i in range(d)]]
 
 
 def f0(positions: Any, goal: Any) -> Any:
@@ -175,29 +171,6 @@ def mutual_information(own: Any, points: Any, weights: Any, variance: Any, other
     return -(weights * np.log((weights * density).sum(axis=1))).sum()
 
 
-def objective(problem: Posed, positions: Any, positive: Any = _positive) -> Any:
-    """The objective: the sum of f0 of eq. (2), in m^2; or of eq. (5) over all targets, in nats, 0 while none is known.
-
-    The sum of the informations is that of all targets together: they are independent, and each has its own
-    measurements.
-    """
-    if problem.objective == REACH_GOAL:
-        return f0(positions, problem.goal).sum()
-    weights, total = problem.sigma_weights, 0.0
-    for k, obstacle in enumerate(targets(problem)):
-        rows = slice(k * len(weights), (k + 1) * len(weights))
-        points, others = problem.sigma_positions[rows], problem.others_distance[rows]
-        information = mutual_information(positions[-1], points, weights, problem.measurement_variance, others)
-        too_far = f6(positions, obstacle, problem.measurement_range, positive)
-        total = total - information + (problem.range_penalty * too_far).sum()
-    return total
-
-
-def targets(problem: Posed) -> Any:
-    """The positions (T, N, 2) of the obstacles that the objective of eq. (5) is about: the first ones."""
-    return problem.obstacle_mean[: len(problem.sigma_positions) // max(len(problem.sigma_weights), 1)]
-
-
 def constraints(problem: Posed, positions: Any, decided: int = 2) -> Any:
     """f3, f4 of each obstacle, f5 of each peer with their margins alpha * sigma, and in space f7, in m: satisfied where
     <= 0.
@@ -215,17 +188,6 @@ def constraints(problem: Posed, positions: Any, decided: int = 2) -> Any:
     if positions.shape[1] == 3:
         rows.extend(f7(positions, problem.lowest, problem.highest))
     return np.stack(rows)[:, decided:]
-
-
-def driven(problem: Posed, controls: Any) -> tuple[Any, Any]:
-    """The ``dynamics`` of a problem: positions and velocities (N, d) at steps 1..N under controls (N, d)."""
-    return dynamics(problem.position, problem.velocity, controls, problem.period)
-
-
-def violations(problem: Posed, controls: Array) -> Array:
-    """The ``constraints`` of a problem under controls (N, d)."""
-    values: Array = constraints(problem, driven(problem, controls)[0])
-    return values
 
 
 def joint_events(tracks: int, detections: int) -> Any:

@@ -24,8 +24,7 @@ from .constraints import (
     subjects,
     term,
 )
-from .definitions import REACH_GOAL
-from .horizon import HorizonProblem
+from .horizon import REACH_GOAL, HorizonProblem
 from .mutual_information import informed, new_points, point_columns
 from .newton import add, clear, control_column, stage_columns, step_column, velocity_column
 from .terms import smoothed, stay_near

@@ -10,6 +10,7 @@ from epicycle.actors import (
     Barrier,
     CircularMotion,
     Inform,
+    Problem,
     ReachGoal,
     RobustController,
     Sensor,
@@ -17,6 +18,7 @@ from epicycle.actors import (
     UnscentedEstimator,
     Vehicle,
 )
+from epicycle.actors.robotics.numerics.horizon import numbers_of
 from epicycle.actors.testing import Harness
 
 if TYPE_CHECKING:
@@ -31,11 +33,13 @@ class _Recorder(Barrier):
     def __init__(self, solver: Solver | None = None) -> None:
         super().__init__()
         self.inner = solver or Barrier()
-        self.records: list[tuple[Any, NDArray[np.float64], Any]] = []
+        self.problems: list[Problem] = []
+        self.records: list[tuple[Any, NDArray[np.float64], Any]] = []  # with the problem as the kernels take it
 
-    def solve(self, problem: Any, starts: NDArray[np.float64]) -> Any:
+    def solve(self, problem: Problem, starts: NDArray[np.float64]) -> Any:
         solution = self.inner.solve(problem, starts)
-        self.records.append((problem, starts.copy(), solution))
+        self.problems.append(problem)
+        self.records.append((numbers_of(problem), starts.copy(), solution))
         return solution
 
 
@@ -86,4 +90,5 @@ def play(
                 peer_plans=known,
             )
             plans.append(controller.last("plan"))
-    return recorder.records, places
+    asked = zip(recorder.problems, recorder.records, strict=True)
+    return [(problem, *answered) for problem, (_, *answered) in asked], places

@@ -24,6 +24,7 @@ from epicycle.actors import (
     Vehicle,
 )
 from epicycle.actors.testing import Harness
+from tests.actors.robotics.numerics.numerics_parts import as_problem, ways
 from tests.actors.robotics.scenario import _Recorder
 
 NUMERICS = "epicycle.actors.robotics.numerics."
@@ -82,7 +83,7 @@ def test_the_plan_is_optimal_by_the_definition() -> None:
     weight = np.array([weights[name] for name in sorted(weights)])
 
     def cost(controls: np.ndarray) -> float:
-        positions = definitions.driven(problem, controls)[0]
+        positions = ways(problem, controls)[0]
         return float(definitions.f0_of_several(positions, problem.peer_mean, weight).sum())
 
     found = barrier.solve(problem, np.zeros((1, 10, 2))).controls
@@ -99,7 +100,8 @@ def test_casadi_finds_the_same_plan() -> None:
     for place in ((30.0, 8.0), (-14.0, 20.0), (16.0, -16.0)):
         problem = posed(objective, estimate=moving, peer_plans=[plan("main", *place)])
         assert len(problem.goal) == 10
-        ours, theirs = (solve(problem, np.zeros((1, 10, 2))) for solve in (barrier.solve, ipopt))
+        start, same = np.zeros((1, 10, 2)), as_problem(problem, objective=objective)._replace(names=("main",))
+        ours, theirs = barrier.solve(problem, start), ipopt(same, start)
         assert ours.objective == pytest.approx(theirs.objective, rel=1e-4)
         assert ours.controls[0] == pytest.approx(theirs.controls[0], abs=0.05)
 

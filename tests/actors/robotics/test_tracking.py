@@ -8,6 +8,7 @@ import pytest
 from scipy.stats import binom, chi2, kstest, poisson
 
 from epicycle.actors import (
+    Barrier,
     BodyState,
     Casadi,
     ClearanceMonitor,
@@ -442,9 +443,10 @@ def test_it_keeps_away_from_all_of_them_and_informs_itself_about_all() -> None:
     """CasADi, an independent program, finds no better plan."""
     pytest.importorskip("casadi")
     for objective in (ReachGoal(), Inform(range=6.0, penalty=0.05)):
-        posed = problem_of(objective, tracks=told((4.5, 1.2), (5.0, -3.0), (12.0, 2.0)))
-        starts = np.zeros((2, len(posed.tube_radius), 2))
-        recorder = _Recorder()
-        ours, theirs = recorder.solve(posed, starts), Casadi().solve(posed, starts)
+        tracks, starts = told((4.5, 1.2), (5.0, -3.0), (12.0, 2.0)), np.zeros((2, 10, 2))
+        harness = Harness(RobustController("main.controller", objective=objective))
+        harness.fire(0.3, trigger=0, state=body(8.0, 0.0, 0.3), tracks=tracks)
+        posed, _ = harness.actor._problem(body(8.0, 0.0, 0.3))
+        ours, theirs = Barrier().solve(posed, starts), Casadi().solve(posed, starts)
         assert ours.violation == theirs.violation == 0.0
         assert ours.objective <= theirs.objective + 1e-3 * max(1.0, abs(theirs.objective))

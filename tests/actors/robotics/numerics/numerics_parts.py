@@ -2,10 +2,13 @@
 
 import importlib
 from collections.abc import Callable
+from typing import Any
 
 import numba
 import numpy as np
 import pytest
+
+from epicycle.actors import DoubleIntegrator, Inform, Objective, Problem, ReachGoal
 
 PREFIX = "epicycle.actors.robotics.numerics."
 importlib.import_module(PREFIX + "compiled").jit()  # which functions compiled here may call
@@ -107,8 +110,68 @@ def crowded_problem(random: np.random.Generator) -> "horizon.HorizonProblem":
     )
 
 
-def objective_by_definition(problem: "horizon.HorizonProblem", controls: np.ndarray) -> float:
-    return float(problem.cost(controls))
+def as_problem(
+    numbers: "horizon.HorizonProblem", ends: np.ndarray | None = None, objective: Objective | None = None
+) -> Problem:
+    """What the kernels take, said by a dynamics and an objective; the other robots, who measure, end at ``ends``."""
+    d, steps = len(numbers.position), len(numbers.tube_radius)
+    climb = {name: min(getattr(numbers, name), 1e6) for name in ("climb_speed", "climb_acceleration")}
+    motion = DoubleIntegrator(
+        dimensions=d, max_speed=numbers.max_speed, max_acceleration=numbers.max_acceleration, **climb
+    )
+    if objective is None and numbers.objective == horizon.REACH_GOAL:
+        (goal,) = numbers.goal
+        objective = ReachGoal(goal=goal)
+    elif objective is None:
+        objective = Inform(
+            range=numbers.measurement_range, penalty=numbers.range_penalty, variance=numbers.measurement_variance
+        )
+    others = np.empty((0, steps, d)) if ends is None else np.repeat(ends[:, np.newaxis], steps, axis=1)
+    return Problem(
+        dynamics=motion,
+        objective=objective,
+        names=tuple(f"other{i}" for i in range(len(others))),
+        period=numbers.period,
+        state=np.concatenate([numbers.position, numbers.velocity]),
+        tube_centre=numbers.tube_centre,
+        tube_radius=numbers.tube_radius,
+        safe_distance=numbers.safe_distance,
+        margin=numbers.margin,
+        obstacle_mean=numbers.obstacle_mean,
+        obstacle_covariance=numbers.obstacle_covariance,
+        peer_mean=np.concatenate([others, numbers.peer_mean]),
+        peer_distance=np.concatenate([np.full((len(others), steps), -1e6), numbers.peer_distance]),
+        samples=numbers.sigma_positions,
+        weights=numbers.sigma_weights,
+        lowest=numbers.lowest,
+        highest=numbers.highest,
+    )
+
+
+def informing(
+    problem: "horizon.HorizonProblem", objective: Inform, ends: np.ndarray | None = None, **fields: Any
+) -> "horizon.HorizonProblem":
+    """The problem with another objective of eq. (5), and others who measure at their ``ends``."""
+    return problem._replace(**objective.pose(as_problem(problem, ends)._replace(**fields)))
+
+
+def ways(problem: "horizon.HorizonProblem", controls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and velocities (N, d) at steps 1..N."""
+    d, state = len(problem.position), np.concatenate([problem.position, problem.velocity])
+    states = DoubleIntegrator(dimensions=d).trajectory(state, controls, problem.period)
+    return states[:, :d], states[:, d:]
+
+
+def violations(problem: "horizon.HorizonProblem", controls: np.ndarray) -> np.ndarray:
+    """f3 to f5 and f7 by their definitions, a row each."""
+    found: np.ndarray = definitions.constraints(problem, ways(problem, controls)[0])
+    return found
+
+
+def objective_by_definition(
+    problem: "horizon.HorizonProblem", controls: np.ndarray, ends: np.ndarray | None = None
+) -> float:
+    return float(as_problem(problem, ends).cost(controls))
 
 
 def solve(problem: "horizon.HorizonProblem", start: np.ndarray | None = None) -> "barrier.Solution":

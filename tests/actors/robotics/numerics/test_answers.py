@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.actors.robotics.numerics.numerics_parts import as_problem, violations
+
 PREFIX = "epicycle.actors.robotics.numerics."
-definitions = importlib.import_module(PREFIX + "definitions")
 barrier = importlib.import_module(PREFIX + "barrier")
 horizon = importlib.import_module(PREFIX + "horizon")
 information = importlib.import_module(PREFIX + "mutual_information")
@@ -52,12 +53,13 @@ def obstacle(x: float, y: float, vx: float, vy: float, xx: float, xy: float, yy:
 def informed(others: list[tuple[float, float]], gamma: float, reach: float) -> dict[str, Any]:
     """Eq. (5) with five sigma points."""
     points = np.array([[0.3, 0.1], [1.2, 0.4], [-0.6, -0.2], [0.1, 1.0], [0.5, -0.9]])
-    ends = np.array([[end] * STEPS for end in others]).reshape(len(others), STEPS, 2)
+    ends = np.array(others).reshape(len(others), 2)
     return {
+        "ends": ends,
         "objective": horizon.INFORM,
         "sigma_positions": points,
         "sigma_weights": np.array([0.0, 0.25, 0.25, 0.25, 0.25]),
-        "others_distance": information.pairwise_distance(points, ends, 2.0),
+        "others_distance": information.pairwise_distance(points, ends[:, np.newaxis], 2.0),
         "measurement_variance": 2.0,
         "range_penalty": gamma,
         "measurement_range": reach,
@@ -118,8 +120,8 @@ PROBLEMS: dict[str, dict[str, Any]] = {
 }
 
 
-def posed(**changes: Any) -> Any:
-    """A problem: at rest nearly, 8 m from the goal, with nobody around."""
+def posed(ends: np.ndarray | None = None, **changes: Any) -> Any:
+    """A problem: at rest nearly, 8 m from the goal, with nobody around; ``ends`` only say where others measure."""
     fields: dict[str, Any] = {
         "period": PERIOD,
         "position": np.zeros(2),
@@ -174,11 +176,11 @@ def test_ipopt_says_the_same(name: str) -> None:
     """To what the barriers leave; crowds are solved roughly, and who is too fast just brakes."""
     ipopt = importlib.import_module("epicycle.actors.robotics.casadi_solver")
     problem, ours = posed(**PROBLEMS[name]), answer(name)
-    theirs = ipopt.solve(problem, starts())
+    theirs = ipopt.solve(as_problem(problem, PROBLEMS[name].get("ends")), starts())
     assert theirs.violation == pytest.approx(ours["violation"], abs=2e-5)
     assert theirs.objective == pytest.approx(ours["objective"], rel=2e-5, abs=2e-6)
     assert np.hypot(*theirs.controls.T).max() <= problem.max_acceleration
-    worst = max(0.0, float(definitions.violations(problem, theirs.controls).max()))
+    worst = max(0.0, float(violations(problem, theirs.controls).max()))
     assert theirs.violation == pytest.approx(worst, abs=1e-6)
     assert theirs.iterations > 5
 
@@ -186,8 +188,8 @@ def test_ipopt_says_the_same(name: str) -> None:
 def test_ipopt_stops_a_runaway_as_far_as_it_can() -> None:
     ipopt = importlib.import_module("epicycle.actors.robotics.casadi_solver")
     problem = posed(**PROBLEMS["much too fast"])
-    theirs = ipopt.solve(problem, starts())
-    assert theirs.violation == pytest.approx(float(definitions.violations(problem, theirs.controls).max()))
+    theirs = ipopt.solve(as_problem(problem), starts())
+    assert theirs.violation == pytest.approx(float(violations(problem, theirs.controls).max()))
     assert np.isfinite(theirs.controls).all()
 
 

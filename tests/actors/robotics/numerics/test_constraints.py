@@ -7,10 +7,9 @@ import numba
 import numpy as np
 import pytest
 
-from tests.actors.robotics.numerics.numerics_parts import PREFIX, crowded_problem, inform_problem, solve
+from tests.actors.robotics.numerics.numerics_parts import PREFIX, crowded_problem, inform_problem, solve, violations
 
 constraints = importlib.import_module(PREFIX + "constraints")
-definitions = importlib.import_module(PREFIX + "definitions")
 horizon = importlib.import_module(PREFIX + "horizon")
 HorizonProblem = horizon.HorizonProblem
 # Called by kernels only; numba looks them up as globals.
@@ -87,7 +86,7 @@ def test_what_is_left_out_no_plan_can_break(random: np.random.Generator) -> None
                     f for f in (1.0, 0.5, 0.2, 0.0) if np.hypot(*(speed + 0.1 * f * controls[s])) <= 8.0
                 )
                 speed += 0.1 * controls[s]
-            values = definitions.violations(problem, controls)
+            values = violations(problem, controls)
             assert all(values[other, step - 2] < 0.0 for other, step in left)
     assert dropped > 1000
 

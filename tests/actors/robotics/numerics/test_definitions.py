@@ -11,15 +11,19 @@ import numba
 import numpy as np
 import pytest
 
+from epicycle.actors import Inform
 from tests.actors.robotics.numerics import test_association
 from tests.actors.robotics.numerics.numerics_parts import (
     PREFIX,
     inform_problem,
+    informing,
     negative_information,
     objective_by_definition,
     packed,
     solve,
     spread,
+    violations,
+    ways,
 )
 
 constraints = importlib.import_module(PREFIX + "constraints")
@@ -66,7 +70,10 @@ def test_a_roaming_target() -> None:
 def test_dynamics(random: np.random.Generator) -> None:
     """Step 1 is given; the first unknown control moves the robot at step 3."""
     position, velocity, controls = random.normal(size=2), random.normal(size=2), random.normal(size=(6, 2))
-    positions, velocities = definitions.dynamics(position, velocity, controls, 0.5)
+    states = [np.concatenate([position, velocity])]
+    for control in controls[:-1]:
+        states.append(np.array(definitions.dynamics(states[-1], control, 0.5)))
+    positions, velocities = np.hsplit(np.array(states), 2)
     assert positions[:3] == pytest.approx(
         np.array([position, position + 0.5 * velocity, position + velocity + 0.25 * controls[0]])
     )
@@ -115,7 +122,7 @@ def test_who_keeps_the_limits(random: np.random.Generator) -> None:
         problem = inform_problem(random)._replace(velocity=random.normal(scale=3.0, size=2), max_speed=5.0)
         problem = problem._replace(max_acceleration=8.0)
         controls = random.normal(scale=3.0, size=(10, 2))
-        velocities = definitions.driven(problem, controls)[1][1:]
+        velocities = ways(problem, controls)[1][1:]
         worst = max(definitions.f1(velocities, 5.0).max(), definitions.f2(controls, 8.0).max())
         assert keeps(controls, np.empty(room_of(*problem)), *problem) == (worst < 0.0)
         kept.append(worst < 0.0)
@@ -196,9 +203,8 @@ def test_information_of_ranges_and_directions(random: np.random.Generator, along
         written = -(weights * np.log((weights * np.exp(-exponent)).sum(axis=1))).sum()
         misfit = definitions.misfit(points, others, along, across)
         assert definitions.mutual_information(own, points, weights, along, misfit, across) == pytest.approx(written)
-        posed = inform_problem(random).to_inform(
-            points, weights, others[:, np.newaxis], along, 0.0, 30.0, across=across
-        )
+        objective = Inform(variance=along, across=across)
+        posed = informing(inform_problem(random), objective, others, samples=points, weights=weights)
         given = (tuple(own.tolist()), points, weights, posed.others_distance, posed.measurement_variance)
         assert negative_information(*given)[0] == pytest.approx(-written, abs=1e-12)
 
@@ -246,7 +252,7 @@ def test_constraints_with_their_margins(random: np.random.Generator) -> None:
         tube_radius=np.linspace(0.6, 4.2, 10),
     )
     controls = random.normal(size=(10, 2))
-    places = definitions.driven(problem, controls)[0]
+    places = ways(problem, controls)[0]
     away = places - problem.obstacle_mean[0]
     n = away / np.linalg.norm(away, axis=1)[:, np.newaxis]
     xx, xy, yy = problem.obstacle_covariance[0].T
@@ -256,7 +262,7 @@ def test_constraints_with_their_margins(random: np.random.Generator) -> None:
         2.0 - np.linalg.norm(away, axis=1) + 2.0 * sigma,
         *(3.0 - np.linalg.norm(places - mean, axis=1) for mean in problem.peer_mean),
     ]
-    expected = definitions.violations(problem, controls)
+    expected = violations(problem, controls)
     assert expected == pytest.approx(np.array(written)[:, 2:], abs=1e-12)
     found = all_values(places, (0.0, 0.0), 4, *problem)
     assert np.isnan(found[:, :2]).all()  # decided before the first control acts
@@ -284,7 +290,7 @@ def test_constraints_in_space(random: np.random.Generator) -> None:
         highest=1.5,
     )
     controls = random.normal(size=(10, 3))
-    places = definitions.driven(problem, controls)[0]
+    places = ways(problem, controls)[0]
     away = places - problem.obstacle_mean[0]
     n = away / np.linalg.norm(away, axis=1)[:, np.newaxis]
     written = [
@@ -294,7 +300,7 @@ def test_constraints_in_space(random: np.random.Generator) -> None:
         -1.0 - places[:, 2],
         places[:, 2] - 1.5,
     ]
-    expected = definitions.violations(problem, controls)
+    expected = violations(problem, controls)
     assert expected == pytest.approx(np.array(written)[:, 2:], abs=1e-12)
     found = all_values(places, (0.0, 0.0, 0.0), 5, *problem)
     assert found[:, 2:] == pytest.approx(expected, abs=1e-12)
@@ -310,8 +316,7 @@ def test_the_reported_objective(random: np.random.Generator, reach: float) -> No
         for rows in (1, 10):  # a goal that stands still, and one that moves
             goal = problem._replace(objective=horizon.REACH_GOAL, goal=random.normal(size=(rows, 2)))
             solution = solve(goal)
-            places = definitions.driven(goal, solution.controls)[0]
-            assert objective_by_definition(goal, solution.controls) == pytest.approx(((places - goal.goal) ** 2).sum())
+            places = ways(goal, solution.controls)[0]
             assert solution.objective == pytest.approx(definitions.f0(places, goal.goal).sum(), abs=1e-9)
 
 
@@ -330,8 +335,10 @@ def test_staying_near_several(random: np.random.Generator) -> None:
             assert found - least == pytest.approx(weights.sum() * definitions.f0(positions, station))
 
 
-def several_targets(random: np.random.Generator, count: int, reach: float) -> "horizon.HorizonProblem":
-    """A robot that is to inform itself about several targets, with a peer that measures, too."""
+def several_targets(
+    random: np.random.Generator, count: int, reach: float
+) -> tuple["horizon.HorizonProblem", np.ndarray]:
+    """A robot that is to inform itself about several targets, and where a peer ends that measures, too."""
     each = [inform_problem(random, reach=reach) for _ in range(count)]
     shifts = random.normal(scale=5.0, size=(count, 2))
     posed = each[0]._replace(
@@ -339,17 +346,17 @@ def several_targets(random: np.random.Generator, count: int, reach: float) -> "h
         obstacle_covariance=np.concatenate([one.obstacle_covariance for one in each]),
     )
     points = np.concatenate([one.sigma_positions + shift for one, shift in zip(each, shifts, strict=True)])
-    peer = random.normal(scale=8.0, size=(1, 10, 2))
-    return posed.to_inform(points, posed.sigma_weights, peer, 2.0, 0.01, reach)
+    ends = random.normal(scale=8.0, size=(1, 2))
+    return informing(posed, Inform(range=reach, penalty=0.01), ends, samples=points), ends
 
 
 @pytest.mark.parametrize("reach", [8.0, 3.0])
 def test_what_is_minimised_for_several_targets(random: np.random.Generator, reach: float) -> None:
     """Eq. (5) for each target, and their sum; one of them alone is as it always was."""
     for count in (1, 2, 5):
-        problem = several_targets(random, count, reach)
+        problem, ends = several_targets(random, count, reach)
         solution = solve(problem)
-        assert solution.objective == pytest.approx(objective_by_definition(problem, solution.controls), abs=1e-9)
+        assert solution.objective == pytest.approx(objective_by_definition(problem, solution.controls, ends), abs=1e-9)
         alone = [
             problem._replace(
                 obstacle_mean=problem.obstacle_mean[k : k + 1],
@@ -358,13 +365,13 @@ def test_what_is_minimised_for_several_targets(random: np.random.Generator, reac
             )
             for k in range(count)
         ]
-        together = sum(objective_by_definition(each, solution.controls) for each in alone)
+        together = sum(objective_by_definition(each, solution.controls, ends) for each in alone)
         assert solution.objective == pytest.approx(together, abs=1e-9)
         assert solution.violation == 0.0
         for _ in range(20):  # and it is a minimum
             other = np.clip(solution.controls + random.normal(scale=0.3, size=(10, 2)), -11.0, 11.0)
-            if definitions.violations(problem, other).max() <= 0.0:
-                assert objective_by_definition(problem, other) > solution.objective - 1e-3
+            if violations(problem, other).max() <= 0.0:
+                assert objective_by_definition(problem, other, ends) > solution.objective - 1e-3
 
 
 def test_the_information_about_independent_targets_is_the_sum(random: np.random.Generator) -> None:

@@ -11,10 +11,10 @@ import pytest
 from scipy.optimize import minimize
 
 from epicycle.actors import Barrier, Inform, ParameterError
+from tests.actors.robotics.numerics.numerics_parts import as_problem, inform_problem, informing, violations
 from tests.actors.robotics.numerics.test_answers import PROBLEMS, STEPS, posed, starts
 
 barrier = importlib.import_module("epicycle.actors.robotics.numerics.barrier")
-definitions = importlib.import_module("epicycle.actors.robotics.numerics.definitions")
 horizon = importlib.import_module("epicycle.actors.robotics.numerics.horizon")
 
 FEASIBLE = ("nothing in the way", "at full speed", "an obstacle ahead", "two peers", "a tube", "a tube that ends")
@@ -22,7 +22,7 @@ INFEASIBLE = ("inside a peer", "inside the obstacle", "a tube and a peer that co
 
 
 def solved(name: str, **rules: Any) -> Any:
-    return Barrier(**rules).solve(posed(**PROBLEMS[name]), starts())
+    return Barrier(**rules).solve(as_problem(posed(**PROBLEMS[name])), starts())
 
 
 def velocities(problem: Any, controls: np.ndarray) -> np.ndarray:
@@ -66,7 +66,7 @@ def test_the_last_free_control_is_held(name: str, free: int) -> None:
     assert np.hypot(*found.controls.T).max() <= problem.max_acceleration
     assert np.hypot(*velocities(problem, found.controls).T).max() <= problem.max_speed
     if found.violation == 0.0:
-        assert max(0.0, definitions.violations(problem, found.controls).max()) <= 1e-6
+        assert max(0.0, violations(problem, found.controls).max()) <= 1e-6
         assert found.objective >= solved(name).objective - 1e-4 * abs(found.objective)
 
 
@@ -102,7 +102,7 @@ def test_what_answers_an_infeasible_problem(name: str) -> None:
     problem = posed(**PROBLEMS[name])
 
     def squared(found: Any) -> float:
-        return float((np.maximum(definitions.violations(problem, found.controls), 0.0) ** 2).sum())
+        return float((np.maximum(violations(problem, found.controls), 0.0) ** 2).sum())
 
     progress, least, brake = (solved(name, infeasible=each) for each in ("progress", "least_violation", "brake"))
     assert min(progress.violation, least.violation) > 0.0
@@ -132,11 +132,9 @@ def test_unknown_rules() -> None:
     assert str(refused.value) == "Barrier.gap: 0 is out of bounds, expected a number from 1e-09 to 1"
 
 
-def test_bits_weigh_the_penalty_against_the_information() -> None:
+def test_bits_weigh_the_penalty_against_the_information(random: np.random.Generator) -> None:
     """-I in bits and gamma f6 have the optimum of -I in nats and gamma f6 log 2."""
-    problem = posed()
-    in_nats, in_bits = (
-        Inform(unit=unit, penalty=0.5).pose(problem, np.zeros((9, 2)), np.full(9, 1 / 9)) for unit in ("nat", "bit")
-    )
+    problem = inform_problem(random)
+    in_nats, in_bits = (informing(problem, Inform(unit=unit, penalty=0.5)) for unit in ("nat", "bit"))
     assert in_nats.range_penalty == 0.5
     assert in_bits.range_penalty == pytest.approx(0.5 * math.log(2.0))

@@ -19,11 +19,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from epicycle.actors import Barrier, ReachGoal
 from tests.actors.robotics.scenario import play
-
-barrier = importlib.import_module("epicycle.actors.robotics.numerics.barrier")
-definitions = importlib.import_module("epicycle.actors.robotics.numerics.definitions")
-horizon = importlib.import_module("epicycle.actors.robotics.numerics.horizon")
 
 RUNS = ((0, 30.0, 0.0, 1), (2, 30.0, 0.0, 2), (3, 10.0, 0.25, 3), (4, 5.0, 0.5, 4))
 PROBLEMS = 110
@@ -42,11 +39,11 @@ def records() -> list[Any]:
 
 
 def violation(problem: Any, controls: np.ndarray) -> float:
-    return float(np.sqrt((np.maximum(definitions.violations(problem, controls), 0.0) ** 2).sum()))
+    return float(np.sqrt((np.maximum(problem.constraints(controls), 0.0) ** 2).sum()))
 
 
 def worst(problem: Any, controls: np.ndarray) -> float:
-    return max(0.0, float(definitions.violations(problem, controls).max()))
+    return max(0.0, float(problem.constraints(controls).max()))
 
 
 def compare(problem: Any, start: np.ndarray, ours: Any) -> tuple[str, str]:
@@ -96,9 +93,9 @@ def test_against_ipopt(records: list[Any], record_property: Any) -> None:
 
 def test_limits_hold_always(records: list[Any]) -> None:
     for problem, _, ours in records:
-        assert np.hypot(*ours.controls.T).max() <= problem.max_acceleration * (1 + 1e-9)
-        velocities = problem.velocity + problem.period * np.cumsum(ours.controls, axis=0)
-        assert np.hypot(*velocities[:-1].T).max() <= problem.max_speed * (1 + 1e-9)
+        assert np.hypot(*ours.controls.T).max() <= problem.dynamics.max_acceleration * (1 + 1e-9)
+        velocities = problem.state[2:] + problem.period * np.cumsum(ours.controls, axis=0)
+        assert np.hypot(*velocities[:-1].T).max() <= problem.dynamics.max_speed * (1 + 1e-9)
 
 
 def test_the_violation_reported_is_the_largest(records: list[Any]) -> None:
@@ -111,7 +108,7 @@ def test_the_violation_reported_is_the_largest(records: list[Any]) -> None:
 
 def test_same_problem_same_bits(records: list[Any]) -> None:
     for problem, starts, ours in records[::5]:
-        again = barrier.solve(problem, starts)
+        again = Barrier().solve(problem, starts)
         assert again.controls.tobytes() == ours.controls.tobytes()
         assert again.iterations == ours.iterations
 
@@ -119,16 +116,16 @@ def test_same_problem_same_bits(records: list[Any]) -> None:
 def test_start_is_not_written_to(records: list[Any]) -> None:
     problem, starts, _ = records[0]
     before = starts.copy()
-    barrier.solve(problem, starts)
+    Barrier().solve(problem, starts)
     assert (starts == before).all()
 
 
 @pytest.mark.parametrize("speed", [8.0, 9.0, 30.0])
 def test_too_fast_a_vehicle_brakes(records: list[Any], speed: float) -> None:
-    goal = next(problem for problem, _, _ in records if problem.objective == horizon.REACH_GOAL)
-    problem = goal._replace(velocity=np.array([0.0, -speed]))
-    solution = barrier.solve(problem, np.zeros((1, 10, 2)))
+    goal = next(problem for problem, _, _ in records if isinstance(problem.objective, ReachGoal))
+    problem = goal._replace(state=np.array([*goal.state[:2], 0.0, -speed]))
+    solution = Barrier().solve(problem, np.zeros((1, 10, 2)))
     assert np.isfinite(solution.controls).all()
-    assert np.hypot(*solution.controls.T).max() <= problem.max_acceleration * (1 + 1e-9)
+    assert np.hypot(*solution.controls.T).max() <= problem.dynamics.max_acceleration * (1 + 1e-9)
     if speed > 8.8:
-        assert solution.controls[0, 1] > 0.9 * problem.max_acceleration
+        assert solution.controls[0, 1] > 0.9 * problem.dynamics.max_acceleration

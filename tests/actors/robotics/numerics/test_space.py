@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from epicycle.actors.robotics.numerics.horizon import numbers_of
 from tests.actors.robotics.numerics.numerics_parts import (
     PREFIX,
+    as_problem,
     barrier,
     definitions,
     horizon,
@@ -15,6 +17,8 @@ from tests.actors.robotics.numerics.numerics_parts import (
     reachability,
     spread,
     ukf,
+    violations,
+    ways,
 )
 from tests.actors.robotics.scenario import play
 
@@ -55,7 +59,8 @@ def records() -> list[Any]:
 def test_what_lies_in_a_plane_is_solved_as_in_the_plane(records: list[Any]) -> None:
     """Nothing draws the plan out of the plane.  Steps on the way may differ, and so may the optimum that is found."""
     same = near = 0
-    for problem, starts, ours in records:
+    for posed, starts, ours in records:
+        problem = numbers_of(posed)
         found = barrier.solve(in_space(problem, 3.0), lifted(starts))
         expected = barrier.solve(problem, starts)
         assert ours.controls.shape == (len(problem.tube_radius), 2)
@@ -68,15 +73,15 @@ def test_what_lies_in_a_plane_is_solved_as_in_the_plane(records: list[Any]) -> N
     assert near >= 0.8 * len(records)
 
 
-def flight(random: np.random.Generator, informs: bool) -> "horizon.HorizonProblem":
+def flight(random: np.random.Generator, informs: bool) -> tuple["horizon.HorizonProblem", np.ndarray | None]:
     """A robot between two heights that climbs slowly, with a target on the ground, another one that flies, and a
-    peer."""
+    peer; and where the others end who measure."""
     plane, steps = inform_problem(random, STEPS, reach=4.0), np.arange(STEPS)[:, np.newaxis]
     problem = in_space(plane)
     own, velocity = np.array([6.0, 5.0, 4.0]), random.uniform(-3.0, 3.0, size=3) * [1.0, 1.0, 0.3]
     coasting, other = own + 0.1 * steps * velocity, own + np.array([-2.5, -2.0, 0.5])
     points = np.ascontiguousarray(problem.sigma_positions)
-    ends = np.tile(random.normal(scale=6.0, size=(2, 1, 3)), (1, STEPS, 1))
+    ends = random.normal(scale=6.0, size=(2, 3))
     cloud = np.linalg.cholesky(0.02 * spread(random, 3))
     covariance = (cloud @ cloud.T)[np.triu_indices(3)]
     problem = problem._replace(
@@ -98,9 +103,14 @@ def flight(random: np.random.Generator, informs: bool) -> "horizon.HorizonProble
         peer_distance=np.full((1, STEPS), 1.5),
     )
     if informs:
-        others = information.pairwise_distance(points, ends, 2.0)
-        return problem._replace(others_distance=others, objective=horizon.INFORM)
-    return problem.to_reach(own + random.normal(scale=4.0, size=3))
+        others = information.pairwise_distance(points, ends[:, np.newaxis], 2.0)
+        return problem._replace(others_distance=others, objective=horizon.INFORM), ends
+    return aimed(problem, own + random.normal(scale=4.0, size=3)), None
+
+
+def aimed(problem: "horizon.HorizonProblem", goal: np.ndarray) -> "horizon.HorizonProblem":
+    """The problem with a goal."""
+    return problem._replace(objective=horizon.REACH_GOAL, goal=goal[np.newaxis])
 
 
 @pytest.mark.slow
@@ -111,17 +121,17 @@ def test_against_ipopt_in_space(random: np.random.Generator, informs: bool) -> N
     ipopt = importlib.import_module("epicycle.actors.robotics.casadi_solver").solve
     same = 0
     for _ in range(12):
-        problem = flight(random, informs)
-        start = np.zeros((1, STEPS, 3))
-        ours, theirs = barrier.solve(problem, start), ipopt(problem, start)
-        worst = definitions.violations(problem, ours.controls).max()
+        problem, ends = flight(random, informs)
+        start, posed = np.zeros((1, STEPS, 3)), as_problem(problem, ends)
+        ours, theirs = barrier.solve(problem, start), ipopt(posed, start)
+        worst = violations(problem, ours.controls).max()
         assert worst <= 1e-6
         assert ours.violation == 0.0
-        velocities = definitions.driven(problem, ours.controls)[1][1:]
+        velocities = ways(problem, ours.controls)[1][1:]
         assert definitions.f1(velocities, 6.0, 2.0).max() <= 0.0
         assert definitions.f2(ours.controls, 10.0, 4.0).max() <= 0.0
         if ours.objective > theirs.objective + 1e-3 * max(1.0, abs(theirs.objective)):
-            again = ipopt(problem, ours.controls[np.newaxis])  # another local optimum
+            again = ipopt(posed, ours.controls[np.newaxis])  # another local optimum
             assert again.objective > ours.objective - 1e-3 * max(1.0, abs(ours.objective))
         same += abs(ours.objective - theirs.objective) <= 1e-3 * max(1.0, abs(theirs.objective))
     assert same >= 9
@@ -129,25 +139,26 @@ def test_against_ipopt_in_space(random: np.random.Generator, informs: bool) -> N
 
 @pytest.mark.parametrize(("aim", "level"), [(20.0, 5.0), (-20.0, 3.0)])
 def test_a_plan_ends_at_the_limit_of_the_height(random: np.random.Generator, aim: float, level: float) -> None:
-    problem = flight(random, informs=False)._replace(
+    problem = flight(random, informs=False)[0]._replace(
         velocity=np.zeros(3), obstacle_mean=np.empty((0, STEPS, 3)), peer_mean=np.empty((0, STEPS, 3)),
         tube_radius=np.full(STEPS, np.inf), period=0.3,
     )  # fmt: skip
-    problem = problem.to_reach(problem.position + np.array([0.0, 0.0, aim]))
+    problem = aimed(problem, problem.position + np.array([0.0, 0.0, aim]))
     solution = barrier.solve(problem, np.zeros((1, STEPS, 3)))
-    heights = definitions.driven(problem, solution.controls)[0][:, 2]
+    heights = ways(problem, solution.controls)[0][:, 2]
     assert heights[-1] == pytest.approx(level, abs=1e-2)
     assert 3.0 <= heights.min() <= heights.max() <= 5.0
 
 
 def test_who_begins_outside_the_heights_comes_back(random: np.random.Generator) -> None:
     """As far as f1 and f2 allow."""
-    problem = flight(random, informs=False)._replace(
+    problem = flight(random, informs=False)[0]._replace(
         position=np.array([0.0, 0.0, 9.0]), velocity=np.zeros(3), tube_radius=np.full(STEPS, np.inf),
         obstacle_mean=np.empty((0, STEPS, 3)), peer_mean=np.empty((0, STEPS, 3)),
-    ).to_reach(np.array([0.0, 0.0, 9.0]))  # fmt: skip
+    )  # fmt: skip
+    problem = aimed(problem, problem.position)
     solution = barrier.solve(problem, np.zeros((1, STEPS, 3)))
-    heights = definitions.driven(problem, solution.controls)[0][:, 2]
+    heights = ways(problem, solution.controls)[0][:, 2]
     assert solution.violation == pytest.approx(heights[2] - 5.0)
     assert heights[-1] < 9.0 - 0.1 * 2.0 * 4  # most of the way at the largest speed
 
