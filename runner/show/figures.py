@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -13,11 +14,12 @@ from epicycle.actors import EpicycleError, Parameter, abridged, texts_parameter
 
 from ..execution.results import Results
 from ..model.catalogue.figure import Figure
-from ..support.shown import listed, short
-from .samples import Numbers, Span, States, envelope, longest_spans, read, spans_of
+from ..support.shown import short
+from .samples import Floats, Numbers, Span, States, envelope, longest_spans, read, spans_of
 from .sheet import (
     MAX_PANELS,
     MAX_TIPS,
+    PALETTE,
     Sheet,
     colours,
     in_common,
@@ -142,7 +144,10 @@ def _strips(sheet: Sheet, strips: States, begin: float, end: float, over: float)
 
 
 class Histogram(Figure):
-    """How often numbers of a signal occur, in bins of equal width; several signals are drawn over each other."""
+    """How often values of a signal occur, in bins of equal width; several signals are drawn over each other.
+
+    If there are no numbers but states (texts, truth values, enumerations), how often each of them occurs.
+    """
 
     signals = texts_parameter(doc="which signals (patterns)")
     bins = Parameter(int, 40, min=1, max=10_000, doc="number of bins")
@@ -155,11 +160,15 @@ class Histogram(Figure):
 
     def draw(self, results: Results, path: Path) -> None:
         numbers, states = read(self.signals, results)
-        if states and not numbers:
-            raise EpicycleError(f"{listed([*states])}: no token has a number, but texts, truth values or other states")
         sheet = Sheet([title_of(results)], heights=[3.0])
+        if numbers or not states:
+            self._bins(sheet, {name: np.array(values) for name, (_, values) in numbers.items()})
+        else:
+            self._counts(sheet, states)
+        sheet.save([path])
+
+    def _bins(self, sheet: Sheet, columns: Mapping[str, Floats]) -> None:
         (axes,) = sheet.axes
-        columns = {name: np.array(values) for name, (_, values) in numbers.items()}
         columns = {name: values[np.isfinite(values)] for name, values in columns.items()}
         count = sum(map(len, columns.values()))
         if self.log_x:
@@ -194,7 +203,21 @@ class Histogram(Figure):
         title = [axes.get_title("left"), *(said if len(said) == 1 else [])]
         title += [f"{left_out:,} values that are not positive are left out"] if left_out else []
         axes.set_title(", ".join(title), loc="left")
-        sheet.save([path])
+
+    def _counts(self, sheet: Sheet, states: States) -> None:
+        (axes,) = sheet.axes
+        counts = Counter(_legible(state) for _, found in states.values() for state in found if state is not None)
+        often = dict(counts.most_common(MAX_STATES))
+        axes.barh(range(len(often)), list(often.values()), color=PALETTE[0], alpha=0.55)
+        axes.set_yticks(range(len(often)), [abridged(state, _LETTERS) for state in often])
+        axes.invert_yaxis()
+        axes.grid(visible=False, axis="y")
+        texts = (f"{state}: {count:,} of {counts.total():,}" for state, count in often.items())
+        sheet.tip(axes, ((count, row) for row, count in enumerate(often.values())), texts)
+        set_log(axes, x=self.log_y, y=False)
+        more = f"; {len(counts) - len(often):,} rarer states are left out" if len(counts) > len(often) else ""
+        axes.set_ylabel(fill(self.label or abridged(", ".join(states), 80), _LETTERS))
+        axes.set_xlabel(f"how often{more}")
 
 
 def _shared(names: Sequence[str]) -> str:

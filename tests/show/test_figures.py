@@ -16,7 +16,6 @@ from epicycle.runner.model.catalogue.packaged import packaged_models
 from epicycle.runner.model.text.problems import Problems
 from epicycle.runner.show import FigureError
 from epicycle.runner.show.canvas import draw
-from epicycle.runner.show.figures import Histogram
 from epicycle.runner.show.sheet import PALETTE, Sheet
 from epicycle.runner.show.trajectories import Trajectories
 from tests.demo_models import DURATIONS
@@ -98,6 +97,7 @@ run: {stop: 4, record: ["t.*"]}
 figures:
   states: {type: TimeSeries, signals: t.text}
   both: {type: TimeSeries, signals: [t.flag, t.light, t.pose], label: speed}
+  often: {type: Histogram, signals: t.text}
 """
 
 
@@ -154,14 +154,11 @@ def test_lines_are_above_strips(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
     assert lines.get_xlim() == strips.get_xlim()
 
 
-def test_a_histogram_is_of_numbers(tmp_path: Path) -> None:
-    (tmp_path / "m.yaml").write_text(FIGURES, encoding="utf-8")
-    results = Simulation(load_model(tmp_path / "m.yaml", types=[Talk])).run()
-    with pytest.raises(FigureError) as caught:
-        draw("often", Histogram(signals="t.text"), results, tmp_path / "f.svg")
-    assert str(caught.value) == (
-        "figure often cannot be drawn: t.text: no token has a number, but texts, truth values or other states"
-    )
+def test_a_histogram_of_states_counts_them(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    [often] = drawn(monkeypatch, tmp_path)["often"]
+    assert [text.get_text() for text in often.get_yticklabels()] == ["idle", "$\\frac{", "'_x'"]
+    assert [bar.get_width() for bar in often.patches] == [2, 1, 1]
+    assert (often.get_ylabel(), often.get_xlabel()) == ("t.text", "how often")
 
 
 def test_figures_of_states_are_files(tmp_path: Path) -> None:

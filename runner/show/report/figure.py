@@ -74,13 +74,13 @@ class StudyFigure(Configurable):
         value = getattr(self, parameter, None) or ()
         return (value,) if isinstance(value, str) else tuple(value)
 
-    def arranged(self, data: Data, *, has_axis: bool = False) -> Layout:
-        """The conditions in panels and lines."""
+    def arranged(self, data: Data, *, has_axis: bool = False, metrics: Sequence[str] = ()) -> Layout:
+        """The conditions in panels and lines; with ``metrics``, these are the lines."""
         over = getattr(self, "over", None) if has_axis else None
         # A figure without this parameter draws one line per panel.
-        lines = getattr(self, "lines", "")
+        lines = "" if metrics else getattr(self, "lines", "")
         found = roles(data.plan, self.where, over, lines, self.named("panels"), has_axis=has_axis)
-        return Layout(data, self, found)
+        return Layout(data, self, found, metrics)
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         """Write the figure to the files and return its caption; ``extracts`` come from repeated runs."""
@@ -161,13 +161,14 @@ class Layout:
     More than a reader can distinguish are left out; ``omitted`` states how many.
     """
 
-    def __init__(self, data: Data, figure: StudyFigure, found: Roles) -> None:
+    def __init__(self, data: Data, figure: StudyFigure, found: Roles, metrics: Sequence[str] = ()) -> None:
         self.roles = found
+        self._metrics = metrics
         self.names = Names(data.plan, figure.labels)
         self.chosen = data.where(figure.where)
         self.levels_of = partial(data.levels, conditions=self.chosen, fixed=figure.where)
         self.handles: dict[str, Any] = {}
-        levels: list[Factor] = self.levels_of(found.lines) if found.lines else [None]
+        levels: list[Factor] = self.levels_of(found.lines) if found.lines else [*metrics] or [None]
         choices = [self.levels_of(name) for name in found.panels]
         panels = []
         for combination in product(*choices):
@@ -200,7 +201,7 @@ class Layout:
 
     def called(self, level: Factor) -> str:
         """The name of a line in the legend."""
-        return self.names.level(self.roles.lines or "", level)
+        return self.names.words(str(level)) if self._metrics else self.names.level(self.roles.lines or "", level)
 
     def about(self, panel: Panel, level: Factor) -> str:
         """The panel and line that a tip belongs to."""
@@ -209,7 +210,7 @@ class Layout:
 
     def show(self, level: Factor, handle: Any) -> None:
         """Add the line of a level to the legend."""
-        if self.roles.lines:
+        if self.roles.lines or self._metrics:
             self.handles.setdefault(self.called(level), handle)
 
     def finish(self, sheet: Sheet, paths: Sequence[Path], *said: str) -> str:

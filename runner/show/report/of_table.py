@@ -37,11 +37,12 @@ class Means(TableFigure):
     """The mean of a metric over a factor, with 95 % intervals (Student; of shares Wilson): a line for each level of
     another factor, and a panel for each level of a third.
 
-    Several metrics each get a row of panels.
+    Several metrics each get a row of panels, or become the lines of one panel.
     """
 
     metric = texts_parameter(doc="column of the table, or several")
     over: Parameter[str | None] = Parameter(str, None, doc="factor along the axis; the first numeric one if left out")
+    together = Parameter(bool, False, doc="whether several metrics are the lines of one panel; they need the same unit")
     same_scale = Parameter(bool, True, doc="whether all panels have the same vertical axis")
     log_x = Parameter(bool, False, doc="whether the horizontal axis is logarithmic")
     log_y = Parameter(bool, False, doc="whether the vertical axis is logarithmic")
@@ -50,18 +51,26 @@ class Means(TableFigure):
         yield from super().complaints(plan)
         if not self.metric:
             yield Fault("it names no metric", ("metric",), help=("name at least one",))
+        units = {plan.columns[name].unit for name in self.metric if name in plan.columns}
+        if self.together and len(units) > 1:
+            units_of = ", ".join(f"{name} in {plan.columns[name].unit or '1'}" for name in self.metric)
+            yield Fault("metrics in one panel need the same unit", ("together",), help=(units_of,))
+        if self.together and self.lines:
+            advice = "leave out 'lines' or 'together'"
+            yield Fault("the metrics are already its lines", ("lines",), help=(advice,))
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
-        arranged = self.arranged(data, has_axis=True)
+        arranged = self.arranged(data, has_axis=True, metrics=self.metric if self.together else ())
         names, axis = arranged.names, _Axis(data, arranged)
-        sheet, panels = by_metric(arranged, self.metric, self.same_scale)
+        sheet, panels = by_metric(arranged, self.metric[:1] if self.together else self.metric, self.same_scale)
         for axes, (metric, panel) in zip(sheet.axes, panels, strict=True):
-            for number, conditions in enumerate(panel.lines.values()):
-                points = self._points(data, axis, conditions, metric)
+            for number, (level, conditions) in enumerate(panel.lines.items()):
+                points = self._points(data, axis, conditions, str(level) if self.together else metric)
                 self._line(sheet, axes, axis, arranged, panel, number, points)
             axis.dress(axes, sheet.columns, is_log=self.log_x)
             set_log(axes, x=self.log_x, y=self.log_y)
-            sheet.call(axes, axis.name, mean_of(names.axis(metric)))
+            what = f"mean ({names.unit(metric)})" if names.unit(metric) else "mean"
+            sheet.call(axes, axis.name, what if self.together else mean_of(names.axis(metric)))
         shares = data.plan.shares.intersection(self.metric)
         kind = "Student" if not shares else "Wilson" if shares.issuperset(self.metric) else "Student; of shares Wilson"
         what = mean_of(listed([*map(names.words, self.metric)]))

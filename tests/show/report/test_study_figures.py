@@ -77,16 +77,39 @@ def test_several_metrics_have_a_row_each(data: Data, sheets: list[Sheet]) -> Non
         assert dict(zip(line.get_xdata(), line.get_ydata(), strict=True)) == pytest.approx(means)
 
 
-def test_means_may_have_a_logarithmic_axis(data: Data, sheets: list[Sheet]) -> None:
-    drawn(data, Means(metric="longest", over="load", log_y=True))
-    ((axes, *_),) = (sheet.axes for sheet in sheets)
-    assert (axes.get_ylabel(), axes.get_yscale()) == ("mean longest time in the queue\n(s)", "log")
+def test_metrics_of_one_unit_may_be_lines_of_one_panel(data: Data, sheets: list[Sheet]) -> None:
+    figure = Means(metric=["mean_wait", "longest"], together=True, over="load", where={"mean_service": 1.0}, log_y=True)
+    assert list(figure.complaints(data.plan)) == []
+    drawn(data, figure)
+    (sheet,) = sheets
+    (axes,) = sheet.axes
+    (legend,) = sheet.canvas.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["time in the queue", "longest time in the queue"]
+    assert (axes.get_ylabel(), axes.get_yscale(), len(axes.containers)) == ("mean (s)", "log", 2)
+    short, long = (container[0].get_ydata() for container in axes.containers)
+    assert all(short < long)
 
 
-def test_means_are_of_a_metric(data: Data) -> None:
-    assert list(Means(metric=[]).complaints(data.plan)) == [
-        Fault("it names no metric", ("metric",), help=("name at least one",))
-    ]
+@pytest.mark.parametrize(
+    ("figure", "parameter", "message", "advice"),
+    [
+        (
+            Means(metric=["mean_wait", "share"], together=True),
+            "together",
+            "metrics in one panel need the same unit",
+            "mean_wait in s, share in 1",
+        ),
+        (
+            Means(metric=["mean_wait", "longest"], together=True, lines="load"),
+            "lines",
+            "the metrics are already its lines",
+            "leave out 'lines' or 'together'",
+        ),
+        (Means(metric=[]), "metric", "it names no metric", "name at least one"),
+    ],
+)
+def test_metrics_that_do_not_go_together(figure: Means, parameter: str, message: str, advice: str, data: Data) -> None:
+    assert list(figure.complaints(data.plan)) == [Fault(message, (parameter,), help=(advice,))]
 
 
 @pytest.mark.parametrize("kind", [Means, Distributions])
