@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         ChannelError,
         Detections,
         Estimate,
+        FilterError,
         Measurement,
         Objective,
         Plan,
@@ -39,7 +40,7 @@ __all__ = [
     "DeadZone", "Default", "Derivative", "Detections", "Difference", "DiscreteFilter", "Display", "DistanceMonitor",
     "Distribution", "DoubleIntegrator", "Dynamics", "Emitter", "Environment", "EpicycleError", "Equals", "Estimate",
     "Estimator", "Events", "Exponential", "Expression", "ExtendedEstimator", "Extreme", "Fault", "FaultError", "Filter",
-    "FilterDesign", "FirstOfInstant", "FirstOrder", "Flooding", "Function",
+    "FilterDesign", "FilterError", "FilterPyEstimator", "FirstOfInstant", "FirstOrder", "Flooding", "Function",
     "FunctionParameter", "Gamma",
     "GoalMonitor", "Histogram", "HoldingExpression", "Host", "Hysteresis", "InertialSensor", "Inform", "Inhibit",
     "InputPort", "IntegratedOUEstimator", "Integrator", "IsPresent", "JPDATracker", "Latest", "LatestOfAll", "Limiter",
@@ -117,7 +118,6 @@ _MODULES = {
 
 # Types that are others now: the message for a model or a program that names one.
 FORMER = {
-    "FilterPyEstimator": "write UnscentedEstimator, ExtendedEstimator or ParticleEstimator",
     "FlyingController": "write RobustController with 'dimensions: 3'",
     "FlyingVehicle": "write Vehicle; it flies if its 'start' has a height",
     "RoamingEstimator": "write IntegratedOUEstimator",

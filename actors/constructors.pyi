@@ -35,6 +35,7 @@ from .robotics.controller import RobustController as _RobustController
 from .robotics.detecting import MultiTargetSensor as _MultiTargetSensor
 from .robotics.dynamics import DoubleIntegrator as _DoubleIntegrator, Dynamics
 from .robotics.estimator import ExtendedEstimator as _ExtendedEstimator, UnscentedEstimator as _UnscentedEstimator
+from .robotics.filterpy_estimator import FilterPyEstimator as _FilterPyEstimator
 from .robotics.integrated_ou import IntegratedOUEstimator as _IntegratedOUEstimator
 from .robotics.monitors import ClearanceMonitor as _ClearanceMonitor, DistanceMonitor as _DistanceMonitor, GoalMonitor as _GoalMonitor, SeparationMonitor as _SeparationMonitor
 from .robotics.motion import WaypointMotion as _WaypointMotion
@@ -239,6 +240,10 @@ class Extreme(_Extreme):
 class Filter(_Filter):
     """Passes on the tokens for which a condition holds; the others are lost."""
     def __init__(self, path: str, *, condition: str | float | Formula = ...) -> None: ...
+
+class FilterPyEstimator(_FilterPyEstimator):
+    """A filter of FilterPy with the model of `UnscentedEstimator`; fuses one measurement after another."""
+    def __init__(self, path: str, *, filter: Literal['ExtendedKalmanFilter', 'UnscentedKalmanFilter', 'CubatureKalmanFilter', 'KalmanFilter', 'SquareRootKalmanFilter'] = ..., noise_direction: Literal['expected', 'predicted'] = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class FirstOfInstant(_FirstOfInstant):
     """Passes on the first token of each instant; others at the same time, also at later microsteps, are lost."""

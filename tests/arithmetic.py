@@ -30,6 +30,7 @@ BANNED = {  # of a module, all that is banned; "*" for everything
     "cmath": "*",
     "scipy": "*",
     "casadi": "*",
+    "filterpy": "*",
 }
 METHODS = frozenset(_REDUCTIONS.split())
 _COUNTS = ("len", "bool")
@@ -49,6 +50,7 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "actors/logic.py": (("sum",), WHOLE),
     "actors/robotics/arrays.py": (("sum",), "only asks whether a sum is finite"),
     "actors/robotics/casadi_solver.py": (("casadi", ".sum()"), FOREIGN),
+    "actors/robotics/filterpy_estimator.py": (("filterpy", "numpy.linalg"), FOREIGN),
     "actors/robotics/numerics/definitions.py": (("**", ".sum()", "sum", "numpy.exp", "numpy.log"), PAPER),
     "actors/robotics/planning.py": ((".sum()",), PAPER),
     "actors/statistics.py": (("**",), FRACTIONS),

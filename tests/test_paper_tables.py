@@ -20,7 +20,7 @@ import pytest
 from epicycle.actors import (
     Actor,
     CircularMotion,
-    ExtendedEstimator,
+    FilterPyEstimator,
     GoalMonitor,
     Inform,
     ReachGoal,
@@ -257,7 +257,7 @@ run: {stop: 1 s}
         (CircularMotion("a"), OBSTACLE),
         (Sensor("a"), SENSOR),
         (UnscentedEstimator("a"), ESTIMATOR),
-        (ExtendedEstimator("a"), ESTIMATOR),
+        (FilterPyEstimator("a"), ESTIMATOR),
         (RobustController("a"), {**CONTROLLER, "max_speed": V_MAX[MAIN], "max_acceleration": A_MAX[MAIN]}),
         (RobustController("a").objective, {"goal": GOAL}),
         (Vehicle("a", start=START), {"max_speed": V_MAX[MAIN], "max_acceleration": A_MAX[MAIN]}),

@@ -5,6 +5,7 @@ from .controller import RobustController
 from .detecting import MultiTargetSensor
 from .dynamics import DoubleIntegrator, Dynamics
 from .estimator import Estimator, ExtendedEstimator, UnscentedEstimator
+from .filterpy_estimator import FilterError, FilterPyEstimator
 from .integrated_ou import IntegratedOUEstimator
 from .messages import (
     BodyState,
@@ -45,7 +46,7 @@ from .world import (
 __all__ = [
     "Barrier", "Beliefs", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion",
     "ClearanceMonitor", "Detections", "DistanceMonitor", "DoubleIntegrator", "Dynamics", "Estimate", "Estimator",
-    "ExtendedEstimator", "Flooding", "GoalMonitor", "Inform",
+    "ExtendedEstimator", "FilterError", "FilterPyEstimator", "Flooding", "GoalMonitor", "Inform",
     "IntegratedOUEstimator", "JPDATracker", "Measurement", "MotionState", "MultiTargetSensor", "Objective",
     "Observation", "ParticleEstimator", "Plan", "Problem", "ReachGoal", "RobustController", "SafeController",
     "SampledEstimate", "Sensor", "SensorModel", "SeparationMonitor", "Solver", "StayNear", "TrackingError", "Tracks",

@@ -228,10 +228,17 @@ class ExtendedEstimator(KalmanEstimator):
 
     def _rows_of(self, mean: Sequence[float], points: Array, measurement: Measurement) -> Array:
         found = np.zeros((len(points), 1))
-        for j in range(len(mean)):
-            step = 1e-6 * max(1.0, abs(mean[j]))
-            sides = [[*mean[:j], mean[j] + sign * step, *mean[j + 1 :]] for sign in (1.0, -1.0)]
-            change = measurement.sensor.difference(*map(measurement.expected, sides))
-            slope = np.array(change, dtype=float) / (2.0 * step)
-            found = found + (points[:, j] - mean[j])[:, np.newaxis] * slope
+        for j, change in enumerate(slopes(measurement, mean)):
+            found = found + (points[:, j] - mean[j])[:, np.newaxis] * change
         return found
+
+
+def slopes(measurement: Measurement, mean: Sequence[float]) -> list[Array]:
+    """How what a sensor measures changes with each number of the target's state: central differences."""
+    found = []
+    for j in range(len(mean)):
+        step = 1e-6 * max(1.0, abs(mean[j]))
+        sides = [[*mean[:j], mean[j] + sign * step, *mean[j + 1 :]] for sign in (1.0, -1.0)]
+        change = measurement.sensor.difference(*map(measurement.expected, sides))
+        found.append(np.array(change, dtype=float) / (2.0 * step))
+    return found

@@ -12,7 +12,7 @@ from typing import Any
 
 from epicycle.actors import open_regular
 
-PACKAGES = ("epicycle", "simpy", "numpy", "scipy", "numba", "networkx", "pyyaml", "pyarrow")
+PACKAGES = ("epicycle", "simpy", "numpy", "scipy", "numba", "filterpy", "networkx", "pyyaml", "pyarrow")
 
 _REVISION = re.compile(r"[0-9a-f]{40}|[0-9a-f]{64}")
 _REFERENCE = re.compile(r"refs(/(?!\.)[^/\s\x00\\]+)+")

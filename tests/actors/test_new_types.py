@@ -24,7 +24,7 @@ from tests.actors.feeding import load
 OLD = {
     "ODE", "Accumulator", "AddSubtract", "BooleanSwitch", "BroadcastChannel", "CircularMotion", "Clock",
     "Comparator", "Const", "Counter", "CurrentMicrostep", "CurrentTime", "Difference", "Display", "DistanceMonitor",
-    "Estimator", "Expression", "Function", "GoalMonitor", "Histogram", "Integrator",
+    "Estimator", "Expression", "FilterPyEstimator", "Function", "GoalMonitor", "Histogram", "Integrator",
     "LogicGate", "LookupTable", "Machine", "MathFunction", "Merge", "MostRecent", "MovingAverage",
     "MovingStatistics", "MultiplyDivide", "PoissonClock", "Queue", "Ramp", "Random", "Recorder", "Repeat", "Replay",
     "ResettableTimer", "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor", "SeparationMonitor",

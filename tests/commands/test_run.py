@@ -229,7 +229,7 @@ def answer(script: str, folder: Path) -> list[str]:
 
 def test_a_small_run_imports_and_searches_only_what_it_needs(tmp_path: Path) -> None:
     late = (
-        "networkx", "scipy", "matplotlib", "numba", "pandas", "rich.progress", "difflib",
+        "networkx", "scipy", "matplotlib", "numba", "pandas", "filterpy", "rich.progress", "difflib",
         "epicycle.actors.continuous", "epicycle.actors.robotics", "epicycle.runner.study.plan",
     )  # fmt: skip
     script = (

@@ -184,7 +184,7 @@ def test_the_public_face_offers_all_of_the_core_and_loads_nothing_heavy() -> Non
         actors, core = (importlib.import_module(f"epicycle.actors{name}") for name in ("", ".core"))
         assert set(core.__all__) <= set(actors.__all__), set(core.__all__) - set(actors.__all__)
         assert all(hasattr(actors, name) for name in actors.__all__)
-        heavy = {"numba", "scipy", "casadi"} & set(sys.modules)
+        heavy = {"numba", "scipy", "filterpy", "casadi"} & set(sys.modules)
         assert not heavy, heavy
     """
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, check=False)

@@ -15,6 +15,7 @@ from epicycle.actors import (
     BodyState,
     Estimate,
     ExtendedEstimator,
+    FilterPyEstimator,
     Inform,
     ParameterError,
     Plan,
@@ -164,7 +165,9 @@ def test_the_car_is_safe(folder: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("estimator", ["UnscentedEstimator", "ExtendedEstimator", "ParticleEstimator"])
+@pytest.mark.parametrize(
+    "estimator", ["UnscentedEstimator", "ExtendedEstimator", "FilterPyEstimator", "ParticleEstimator"]
+)
 def test_a_bearing_only_sensor_in_every_filter(estimator: str, folder: Path) -> None:
     """Four robots that see directions know where the obstacle is; late and lost messages included."""
     model = load_model(
@@ -180,7 +183,7 @@ def test_an_angle_has_no_beginning(folder: Path) -> None:
     """The target behind the robot, where bearings jump by a whole turn."""
     (bearing,) = types("bearing")
     sensors = [Harness(Sensor(f"r{i}.s", model=bearing(deviation=0.02)), seed=i) for i in range(2)]
-    for kind in (UnscentedEstimator, ExtendedEstimator):
+    for kind in (UnscentedEstimator, ExtendedEstimator, FilterPyEstimator):
         estimator = Harness(kind("e", prior_mean=(-9, 0, 0, 0), prior_variance=(4, 4, 1, 1)))
         for k in range(30):
             measured = []

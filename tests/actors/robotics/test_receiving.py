@@ -15,7 +15,7 @@ from epicycle.actors import (
     Detections,
     DistanceMonitor,
     Estimate,
-    ExtendedEstimator,
+    FilterPyEstimator,
     GoalMonitor,
     Inform,
     IntegratedOUEstimator,
@@ -67,7 +67,7 @@ MAKES: dict[type, Callable[[int], Any]] = {
     Plan: lambda n: Plan("a", 0.0, state(n), np.zeros((11, n))),
 }
 ACTORS = [
-    ClearanceMonitor, DistanceMonitor, ExtendedEstimator, Flying, GoalMonitor, IntegratedOUEstimator, JPDATracker,
+    ClearanceMonitor, DistanceMonitor, FilterPyEstimator, Flying, GoalMonitor, IntegratedOUEstimator, JPDATracker,
     MultiTargetSensor, RobustController, SafeController, Sensor, SeparationMonitor, TrackingError, UnscentedEstimator,
 ]  # fmt: skip
 PORTS = [(actor, name) for actor in ACTORS for name, port in actor("a").inputs.items() if port.type in MAKES]

@@ -13,12 +13,21 @@ from epicycle.actors import (
     BroadcastChannel,
     ChannelError,
     Estimate,
-    ExtendedEstimator,
+    FilterError,
+    FilterPyEstimator,
     Measurement,
     Sensor,
     UnscentedEstimator,
 )
 from epicycle.actors.testing import Harness
+
+FILTERS = (
+    "KalmanFilter",
+    "SquareRootKalmanFilter",
+    "ExtendedKalmanFilter",
+    "UnscentedKalmanFilter",
+    "CubatureKalmanFilter",
+)
 
 
 def body(x: float, y: float, time: float = 0.0) -> BodyState:
@@ -184,7 +193,7 @@ def numbers(estimate: Estimate) -> list[object]:
     return [estimate.time, estimate.mean.tolist(), estimate.covariance.tolist()]
 
 
-@pytest.mark.parametrize("make", [UnscentedEstimator, ExtendedEstimator])
+@pytest.mark.parametrize("make", [UnscentedEstimator, FilterPyEstimator])
 def test_late_measurements_are_fused_at_their_own_time_to_the_last_bit(make: type) -> None:
     """In whatever order they come, and whether between triggers or at one, in the end nothing tells that they did."""
     random = np.random.default_rng(3)
@@ -203,6 +212,21 @@ def test_late_measurements_are_fused_at_their_own_time_to_the_last_bit(make: typ
     ]
     assert numbers(late.last("estimate")) == numbers(in_time.last("estimate"))
     assert late.tokens("too_late") == []
+
+
+@pytest.mark.parametrize("filter_name", FILTERS)
+def test_every_filter_goes_back(filter_name: str) -> None:
+    in_time, late = (Harness(FilterPyEstimator("e", filter=filter_name)) for _ in range(2))
+    for tick in range(6):
+        now = tick / 10
+        in_time.fire(now, trigger=tick, measurements=[measured("a", now), measured("b", now, 9.0)])
+        late.fire(now, trigger=tick, measurements=[measured("a", now), measured("b", now - 0.2, 9.0)][: 1 + (tick > 1)])
+    for tick in (6, 7):
+        late.fire(tick / 10, trigger=tick, measurements=[measured("b", tick / 10 - 0.2, 9.0)])
+        in_time.fire(tick / 10, trigger=tick)
+    assert late.last("estimate").mean == pytest.approx(in_time.last("estimate").mean, abs=1e-9)
+    assert late.last("estimate").covariance == pytest.approx(in_time.last("estimate").covariance, abs=1e-9)
+    assert late.last("estimate").sources == ("b",)
 
 
 def test_a_measurement_between_two_triggers_is_fused_at_its_own_time() -> None:
@@ -224,7 +248,7 @@ def test_a_measurement_between_two_triggers_is_fused_at_its_own_time() -> None:
     assert harness.last("estimate").sources == ("a",)
 
 
-@pytest.mark.parametrize("make", [UnscentedEstimator, ExtendedEstimator])
+@pytest.mark.parametrize("make", [UnscentedEstimator, FilterPyEstimator])
 def test_what_comes_too_late_is_counted(make: type) -> None:
     harness = Harness(make("e", max_delay="300 ms"))
     for tick in range(1, 6):
@@ -271,7 +295,7 @@ def test_estimate_and_measurement_are_of_the_time_of_what_they_describe() -> Non
     assert estimator.last("estimate").time == 0.4
 
 
-@pytest.mark.parametrize("make", [UnscentedEstimator, ExtendedEstimator])
+@pytest.mark.parametrize("make", [UnscentedEstimator, FilterPyEstimator])
 def test_order_of_arrival_is_immaterial_to_the_last_bit(make: type) -> None:
     measurements = [
         Measurement(name, np.array([x, 1.0]), "relative_position", np.array([12.0 - x, 2.0]), 0.2, 2.0, 0.0)
@@ -286,7 +310,7 @@ def test_order_of_arrival_is_immaterial_to_the_last_bit(make: type) -> None:
     assert len(found) == 1
 
 
-@pytest.mark.parametrize("make", [UnscentedEstimator, ExtendedEstimator])
+@pytest.mark.parametrize("make", [UnscentedEstimator, FilterPyEstimator])
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e200])
 def test_estimator_never_sends_what_is_not_finite(make: type, bad: float) -> None:
     harness = Harness(make("e"))
@@ -305,12 +329,25 @@ def test_estimator_never_sends_what_is_not_finite(make: type, bad: float) -> Non
         assert [each.sources for each in harness.tokens("estimate")] == [("a",), (), (), ("a",)]
 
 
-def test_the_extended_filter_is_near_the_unscented_one() -> None:
-    """Relative positions are linear: only rounding differs, and what differences leave of the slopes."""
-    ours, theirs = (drive(Harness(make("e")), 60) for make in (UnscentedEstimator, ExtendedEstimator))
+@pytest.mark.parametrize("filter_name", FILTERS)
+def test_filterpy_is_near_ours(filter_name: str) -> None:
+    ours = drive(Harness(UnscentedEstimator("e")), 60)
+    theirs = drive(Harness(FilterPyEstimator("e", filter=filter_name)), 60)
+    # Relative positions are linear: only rounding differs, from the first huge prior on.
     assert theirs[:, 0] == pytest.approx(ours[:, 0], abs=1e-6)
+
+
+@pytest.mark.parametrize("filter_name", FILTERS[2:])
+def test_filterpy_with_ranges_is_near_ours(filter_name: str) -> None:
     prior = {"prior_mean": [12, 2, 0, 0], "prior_variance": [4, 4, 4, 4]}
-    ours, theirs = (
-        drive(Harness(make("e", **prior)), 60, kind="range") for make in (UnscentedEstimator, ExtendedEstimator)
-    )
+    ours = drive(Harness(UnscentedEstimator("e", **prior)), 60, kind="range")
+    theirs = drive(Harness(FilterPyEstimator("e", filter=filter_name, **prior)), 60, kind="range")
     assert np.hypot(*(theirs[10:, 0, :2] - ours[10:, 0, :2]).T).max() < 0.2
+
+
+@pytest.mark.parametrize("filter_name", FILTERS[:2])
+def test_linear_filter_with_ranges_is_an_error_with_a_way_out(filter_name: str) -> None:
+    harness = Harness(FilterPyEstimator("main.estimator", filter=filter_name))
+    measurement = Measurement("a", np.zeros(2), "range", np.array([5.0]), 0.2, 2.0, 0.0)
+    with pytest.raises(FilterError, match=r"main\.estimator: .*ExtendedKalmanFilter"):
+        harness.fire(0.0, trigger=0, measurements=[measurement])
