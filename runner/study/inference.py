@@ -34,18 +34,14 @@ class Estimate:
     count: int
 
 
-def half_width(values: Sequence[float], level: float = LEVEL) -> float:
-    """Half the width of Student's confidence interval of the mean; infinite for fewer than two values."""
-    count = len(values)
-    return student_quantile((1 + level) / 2, count - 1) * _standard_error(values) if count > 1 else math.inf
-
-
-def half_of(values: Sequence[float], level: float = LEVEL, *, is_share: bool = False) -> float:
+def half_width(values: Sequence[float], level: float = LEVEL, *, is_share: bool = False) -> float:
     """Half the width of the interval of ``average``; infinite for fewer than two values."""
-    if not is_share or len(values) < 2:
-        return half_width(values, level)
-    found = average(values, level, is_share=True)
-    return (found.high - found.low) / 2
+    if len(values) < 2:
+        return math.inf
+    if is_share:
+        found = average(values, level, is_share=True)
+        return (found.high - found.low) / 2
+    return student_quantile((1 + level) / 2, len(values) - 1) * _standard_error(values)
 
 
 def _standard_error(values: Sequence[float]) -> float:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 
-from ..inference import half_of
+from ..inference import half_width
 from ..plan.plan import Condition, Plan
 from .share import ALL, Share
 
@@ -130,7 +130,7 @@ class Backlog:
                 yield None
             if until is not None:
                 is_share = until.metric in self.plan.shares
-                if not half_of(values, is_share=is_share) >= until.half_width:
+                if not half_width(values, is_share=is_share) >= until.half_width:
                     self.stopped_early += max(0, most - start - batch)
                     break
         del self._open[index], self._values[index], self._running[index]
