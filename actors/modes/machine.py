@@ -313,6 +313,9 @@ class StateMachine(ModalActor):
 
     # -- guards and actions ---------------------------------------------------------------------------------------
 
+    def is_present(self, port: str) -> bool:
+        return port in self._tokens
+
     def hears(self, rule: Rule) -> bool:
         return not self._tokens.keys().isdisjoint(rule.on)
 

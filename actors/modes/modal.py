@@ -82,9 +82,13 @@ class ModalActor(Actor):
 
     # -- parts of a transition ------------------------------------------------------------------------------------
 
+    def is_present(self, port: str) -> bool:
+        """Whether an input has a token in this reaction."""
+        return self.inputs[port].present
+
     def hears(self, rule: Rule) -> bool:
         """Whether one of the inputs of a transition has a token in this reaction."""
-        return any(self.inputs[name].present for name in rule.on)
+        return any(map(self.is_present, rule.on))
 
     def holds(self, rule: Rule) -> bool:
         """Whether the guard of a transition holds."""
