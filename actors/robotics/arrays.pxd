@@ -2,7 +2,6 @@
 
 cpdef read_only(value)
 cpdef array_of(numbers)
-cpdef tuple pair(values)
 cpdef tuple floats(values)
 cpdef bint all_finite(numbers) except -1
 cpdef bint finite(array) except -1

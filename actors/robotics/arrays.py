@@ -13,9 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
-# Of floats: arithmetic on arrays of two takes ten times as long.
-Pair = tuple[float, float]
-
 _FLOAT = np.dtype(np.float64)  # NumPy searches for it at each call if the type is given instead
 
 
@@ -29,12 +26,6 @@ def read_only(value: ArrayLike) -> Array:
 def array_of(numbers: Sequence[float]) -> Array:
     """An array of one dimension."""
     return np.array(numbers, _FLOAT)
-
-
-def pair(values: ArrayLike) -> Pair:
-    """The two floats of an array."""
-    x, y = np.asarray(values, dtype=_FLOAT).tolist()
-    return x, y
 
 
 def floats(values: ArrayLike) -> tuple[float, ...]:

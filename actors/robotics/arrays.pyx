@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 numpy.import_array()
 
 Array = NDArray[np.float64]
-Pair = tuple[float, float]
 cdef object FLOAT = np.dtype(np.float64)
 
 
@@ -59,15 +58,6 @@ cpdef read_only(value):
     made = numpy.PyArray_NewCopy(<numpy.ndarray>value, numpy.NPY_CORDER) if is_plain(value) else array_of(value)
     numpy.PyArray_CLEARFLAGS(<numpy.ndarray>made, numpy.NPY_ARRAY_WRITEABLE)
     return made
-
-
-cpdef tuple pair(values):
-    cdef double* data
-    if is_plain(values) and (<numpy.ndarray>values).ndim == 1 and size_of(values) == 2:
-        data = numbers_of(values)
-        return data[0], data[1]
-    x, y = np.asarray(values, dtype=FLOAT).tolist()
-    return x, y
 
 
 cpdef tuple floats(values):

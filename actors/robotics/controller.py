@@ -304,19 +304,20 @@ class RobustController(TargetModel, Actor):
     def _problem(self, own: BodyState) -> tuple[Problem, Array]:
         """The problem, and the starts of its solver (2, N, m): the standing plan from the next period on; braking."""
         now, period, d = own.time, self.period, self._d
+        motion: Any = self._motion
         made_at, begun, controls = self._standing
         if self._is_papers:
             # Floats: arithmetic on arrays of two takes ten times as long.
             place, moving, pushed = floats(own.position), floats(own.velocity), floats(self._applied)
             place = tuple([p + period * v for p, v in zip(place, moving, strict=True)])
             moving = tuple([v + period * u for v, u in zip(moving, pushed, strict=True)])
-            state, (speed, most) = array_of((*place, *moving)), self._braking(moving)
+            state, (speed, most) = array_of((*place, *moving)), motion.speed_and_braking(moving)
             tube_centre, tube_radius, starts = self._standing_plan(
                 begun[:d], begun[d:], controls, now - made_at, self._radius, state[d:], speed, most, period
             )
         else:
-            state = self._motion.next_state(own, self._applied, period)
-            tube_centre, tube_radius, starts = self._motion.standing_plan(
+            state = motion.next_state(own, self._applied, period)
+            tube_centre, tube_radius, starts = motion.standing_plan(
                 begun, controls, now - made_at, self._radius, state, period
             )
         obstacle_mean, obstacle_covariance, samples, weights = self._expected(now)
@@ -325,7 +326,7 @@ class RobustController(TargetModel, Actor):
             there, apart = self._standing_there
             peer_mean, peer_distance = np.concatenate((peer_mean, there)), np.concatenate((peer_distance, apart))
         problem = Problem(
-            self._motion, self._objective, self._peers.names, period, state, tube_centre, tube_radius,
+            motion, self._objective, self._peers.names, period, state, tube_centre, tube_radius,
             self.safe_distance, self.margin, obstacle_mean, obstacle_covariance, peer_mean, peer_distance, samples,
             weights, *self._heights,
         )  # fmt: skip
@@ -363,15 +364,3 @@ class RobustController(TargetModel, Actor):
         if self._tracks is not None:
             targets.extend(self._tracks.estimates)
         return targets
-
-    def _braking(self, velocity: tuple[float, ...]) -> tuple[float, float]:
-        """The speed, and the largest acceleration against it."""
-        motion: Any = self._motion
-        level, most = hypot(velocity[0], velocity[1]), motion.max_acceleration
-        if len(velocity) == 2:
-            return level, most
-        speed = hypot(level, velocity[2])
-        if not 0.0 < speed < math.inf:
-            return speed, most
-        weighted = hypot(level, velocity[2] * (most / motion.climb_acceleration))
-        return speed, most * (speed / weighted)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core import Actor, InputPort, OutputPort, Parameter
 from ..core.elementary import cos, hypot, sin
-from .arrays import pair
+from .arrays import floats
 from .messages import BodyState, Detections, enclosing
 from .receiving import PLANE, by_channel, latest
 from .sensor_models import RANGE, RELATIVE_POSITION
@@ -57,11 +57,11 @@ class MultiTargetSensor(Actor):
         if not self.robot.present:
             return
         robot = latest(self.robot, PLANE)
-        x, y = pair(robot.position)
+        x, y = floats(robot.position)
         seen: list[tuple[float, ...]] = []
         for (chance, *errors), states in zip(drawn, by_channel(self.targets, PLANE), strict=True):
             for state in list(states)[-1:]:
-                tx, ty = pair(state.position)
+                tx, ty = floats(state.position)
                 dx, dy = tx - x, ty - y
                 distance = hypot(dx, dy)
                 if distance <= self.max_range and chance < self.detection_probability:

@@ -160,12 +160,18 @@ class DoubleIntegrator(Dynamics):
 
     def braking(self, state: Numbers, period: float) -> Numbers:
         velocity = state[self.dimensions :]
-        speed = length(velocity)
+        speed, most = self.speed_and_braking(velocity)
         if not speed > 0.0:
             return [0.0] * self.dimensions
-        weighted = length(velocity, self.max_acceleration / self.climb_acceleration)
-        push = min(0.95 * self.max_acceleration * (speed / weighted), speed / period)
+        push = min(0.95 * most, speed / period)
         return [-push * (v / speed) for v in velocity]
+
+    def speed_and_braking(self, velocity: Sequence[float]) -> tuple[float, float]:
+        """The speed, and the largest acceleration against it."""
+        speed, most = length(velocity), self.max_acceleration
+        if len(velocity) == 2 or not 0.0 < speed < math.inf:
+            return speed, most
+        return speed, most * (speed / length(velocity, most / self.climb_acceleration))
 
     def body(self, state: Sequence[float], time: float) -> BodyState:
         d = self.dimensions

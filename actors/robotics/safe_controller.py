@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core import OutputPort, Parameter, ParameterError
 from ..core.elementary import cos, sin
-from .arrays import Array, pair
+from .arrays import Array, floats
 from .controller import RobustController
 from .integrated_ou import IntegratedOU
 from .messages import BodyState
@@ -124,8 +124,8 @@ class SafeController(IntegratedOU, RobustController):
                 self._retreat = _Retreat(self._directions[row], float(reaches[row]), now)
                 return control
             if last is not None:
-                moved = last.reach + self.target_speed * (now - last.time)
-                if self._kept(*pair(last.direction), moved, *start, control, *self._limits) >= self.safe_distance:
+                moved, (x, y) = last.reach + self.target_speed * (now - last.time), floats(last.direction)
+                if self._kept(x, y, moved, *start, control, *self._limits) >= self.safe_distance:
                     return control
         if last is not None:
             return self._away(last)

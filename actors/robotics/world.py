@@ -20,7 +20,7 @@ from ..core import (
     shaped,
 )
 from ..core.elementary import cos, hypot, sin
-from .arrays import all_finite, floats, pair
+from .arrays import all_finite, floats
 from .dynamics import DoubleIntegrator, Dynamics
 from .messages import BodyState, Measurement, Observation, Plan, enclosing, state_of
 from .receiving import PlaceParameter, latest
@@ -121,7 +121,7 @@ class CircularMotion(Actor):
         # The chord of the arc travelled: correct for any turn rate, including 0.
         chord = self.speed * elapsed * _sinc(turned / (2.0 * math.pi))
         direction, heading = self.heading + turned / 2.0, self.heading + turned
-        x, y = pair(self.start)
+        x, y = floats(self.start)
         position = x + chord * cos(direction), y + chord * sin(direction)
         velocity = self.speed * cos(heading), self.speed * sin(heading)
         self.state.send(BodyState(position, velocity, now))

@@ -136,12 +136,7 @@ def f6(positions: Any, obstacle: Any, reach: Any, positive: Any = _positive) -> 
 
     A solver that works on symbols has variables in the place of the maximum.
     """
-    return positive(out_of_reach(positions, obstacle, reach))
-
-
-def out_of_reach(positions: Any, obstacle: Any, reach: Any) -> Any:
-    """Eq. (5), (N,) in m: the term that f6 compares with 0."""
-    return _norm(obstacle - positions) - reach
+    return positive(_norm(obstacle - positions) - reach)
 
 
 def misfit(points: Any, robots: Any, variance: Any, across: Any = None) -> Any:
@@ -198,29 +193,13 @@ def joint_events(tracks: int, detections: int) -> Any:
             yield event
 
 
-def association(missed: Array, likelihood: Array, density: float) -> Array:
-    """JPDA, (T, 1 + m): the probability that a track caused no detection, or each one, summed over all joint events.
+def association(missed: Array, likelihood: Array, density: float, existence: Array) -> tuple[Array, Array]:
+    """JIPDA: how likely each track exists after the scan (T,), and the probability that, if so, it caused no detection,
+    or each one (T, 1 + m), summed over all joint events; JPDA, if ``existence`` (T,), how likely it did before, is 1.
 
-    The density of an event is the product of ``missed`` (T,), 1 - P_D P_G, of each track without a detection, of the
-    ``likelihood`` (T, m), P_D N(z_j; z, S) inside the gate and 0 outside, of each with one, and of the ``density`` of
-    detections from elsewhere for each that no track caused.
-    """
-    tracks, detections = likelihood.shape
-    result = np.zeros((tracks, 1 + detections))
-    for event in joint_events(tracks, detections):
-        worth = density ** (detections - sum(each > 0 for each in event))
-        for t, each in enumerate(event):
-            worth *= likelihood[t, each - 1] if each else missed[t]
-        result[np.arange(tracks), event] += worth
-    normalised: Array = result / result.sum(axis=1, keepdims=True)
-    return normalised
-
-
-def integrated_association(missed: Array, likelihood: Array, density: float, existence: Array) -> tuple[Array, Array]:
-    """JIPDA: how likely each track exists after the scan (T,), and what it caused if so, (T, 1 + m).
-
-    Each track exists with the probability ``existence`` (T,); a joint event is one of those that exist, and the others
-    caused nothing.
+    A joint event is one of the tracks that exist; the others caused nothing.  Its density is the product of ``missed``
+    (T,), 1 - P_D P_G, of each track without a detection, of the ``likelihood`` (T, m), P_D N(z_j; z, S) inside the gate
+    and 0 outside, of each with one, and of the ``density`` of detections from elsewhere for each that no track caused.
     """
     tracks, detections = likelihood.shape
     result, total = np.zeros((tracks, 1 + detections)), 0.0
@@ -233,7 +212,8 @@ def integrated_association(missed: Array, likelihood: Array, density: float, exi
                 else:
                     worth *= 0.0 if each else 1.0 - existence[t]
             total += worth
-            result[there, np.array(event)[list(there)]] += worth
+            here = np.flatnonzero(there)
+            result[here, np.array(event, dtype=int)[here]] += worth
     after = result.sum(axis=1)
     return after / total, result / after[:, np.newaxis]
 

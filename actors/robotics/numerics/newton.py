@@ -18,13 +18,13 @@ from .vectors import (
     Vector,
     applied,
     dot,
-    head,
     inverse_of,
     packed,
     plus,
     quadratic_size,
     read,
     replaced,
+    row,
     scaled,
     symmetric_size,
     times,
@@ -250,7 +250,7 @@ def newton_step(stages: Array, period: float, free: int, zero: Vector) -> float:
             PU, VU = scaled(h, B), scaled(h, _hessian(none, C))
             U = _next_velocity(h, C, VU)
         function = total(read(nothing, stages, s, control_at), U)
-        gradient = head(zero, function)
+        gradient = row(zero, function, 0)
         block = zero_symmetric(zero)
         for c in range(symmetric_size(d)):
             block = replaced(block, c, function[d + c])

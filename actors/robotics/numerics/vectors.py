@@ -88,14 +88,6 @@ def write(table: Array, row: int, column: int, values: Vector) -> None:
 
 
 @inlined
-def head(like: Vector, values: Vector) -> Vector:
-    """The first numbers, as many as ``like`` has."""
-    for c in range(len(like)):
-        like = replaced(like, c, values[c])
-    return like
-
-
-@inlined
 def total(u: Vector, v: Vector) -> Vector:
     for c in range(len(u)):
         u = replaced(u, c, u[c] + v[c])
@@ -162,6 +154,7 @@ def side(m: Matrix) -> int:
 
 @inlined
 def row(like: Vector, m: Matrix, i: int) -> Vector:
+    """The i-th so many numbers of a tuple as ``like`` has."""
     for c in range(len(like)):
         like = replaced(like, c, m[i * len(like) + c])
     return like

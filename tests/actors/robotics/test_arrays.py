@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from epicycle.actors.robotics.arrays import all_finite, array_of, finite, joined, pair, read_only, stacked
+from epicycle.actors.robotics.arrays import all_finite, array_of, finite, floats, joined, read_only, stacked
 
 GRID = np.arange(6.0).reshape(2, 3)
 ARRAYS = [
@@ -34,18 +34,10 @@ def test_arrays_of_numbers(given: Any) -> None:
     assert made.tobytes() == np.array(given, float).tobytes()
 
 
-@pytest.mark.parametrize(
-    "given", [ARRAYS[0], ARRAYS[5], ARRAYS[6], ARRAYS[7], np.arange(4.0)[::3], [1, 2.5], (1.0, 2.0)]
-)
-def test_pairs(given: Any) -> None:
-    assert pair(given) == tuple(np.asarray(given, float).tolist())
-    assert [type(each) for each in pair(given)] == [float, float]
-
-
-@pytest.mark.parametrize("given", [np.zeros(3), np.zeros(1), np.zeros(())])
-def test_what_is_no_pair(given: Any) -> None:
-    with pytest.raises((ValueError, TypeError)):
-        pair(given)
+@pytest.mark.parametrize("given", [*(each for each in ARRAYS if each.ndim == 1), [1, 2.5], (1.0, 2.0)])
+def test_floats(given: Any) -> None:
+    assert floats(given) == tuple(np.asarray(given, float).tolist())
+    assert all(type(each) is float for each in floats(given))
 
 
 @pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])

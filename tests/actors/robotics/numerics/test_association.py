@@ -65,6 +65,12 @@ def written(scene: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     return np.array(missed), np.array(likelihood).reshape(len(missed), len(rows))
 
 
+def jpda(missed: np.ndarray, likelihood: np.ndarray, density: float) -> np.ndarray:
+    """The definition for tracks that exist."""
+    found: np.ndarray = definitions.association(missed, likelihood, density, np.ones(len(missed)))[1]
+    return found
+
+
 @pytest.mark.parametrize("dimensions", [1, 2])
 def test_the_probability_of_a_gate(dimensions: int) -> None:
     for gate in (1e-6, 0.5, 4.0, 9.0, 16.0, 100.0, 900.0):
@@ -82,7 +88,7 @@ def test_association_probabilities(random: np.random.Generator, kind: int) -> No
             given["max_range"] = 15.0  # within the cloud of sigma points
         *_, found, shares, rough = association.fuse_scan(*given.values())
         missed, likelihood = written(given)
-        assert found == pytest.approx(definitions.association(missed, likelihood, given["density"]), abs=1e-11)
+        assert found == pytest.approx(jpda(missed, likelihood, given["density"]), abs=1e-11)
         assert rough == 0
         assert len(shares) == len(given["means"])
         shared += bool(((likelihood > 0.0).sum(axis=0) > 1).any())
@@ -96,7 +102,7 @@ def test_tracks_that_may_not_exist(random: np.random.Generator) -> None:
         given = scene(random, 1 + number % 4, number % 5, (ukf.RELATIVE_POSITION, ukf.RANGE)[number % 2])
         given["existence"] = random.uniform(0.05, 1.0, size=1 + number % 4)
         _, _, existence, caused, *_ = association.fuse_scan(*given.values())
-        expected = definitions.integrated_association(*written(given), given["density"], given["existence"])
+        expected = definitions.association(*written(given), given["density"], given["existence"])
         assert existence == pytest.approx(expected[0], abs=1e-11)
         assert caused == pytest.approx(expected[1], abs=1e-11)
 
@@ -124,7 +130,7 @@ def test_clusters_are_independent(random: np.random.Generator) -> None:
         likelihood = random.uniform(size=(tracks, detections)) * (random.uniform(size=(tracks, detections)) < 0.3)
         missed = random.uniform(0.05, 1.0, size=tracks)
         found, rough = association.association_probabilities(np.column_stack([missed, likelihood / 0.3]))
-        assert found == pytest.approx(definitions.association(missed, likelihood, 0.3), abs=1e-12)
+        assert found == pytest.approx(jpda(missed, likelihood, 0.3), abs=1e-12)
         assert rough == 0
         sizes.add(len(np.unique(association._labels(np.column_stack([missed, likelihood])))))
     assert sizes == {1, 2, 3, 4, 5}
