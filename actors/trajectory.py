@@ -194,7 +194,7 @@ def _unrolled(
 ) -> tuple[Callable[..., Any], Callable[..., Any]] | None:
     """The functions of a step with these derivatives; None if it would be too long."""
     made: dict[str, Any] = {**KNOWN, "abs": abs, "sqrt": math.sqrt}
-    exec(unrolled(tableau, rates, times, held), made)
+    exec(compile(unrolled(tableau, rates, times, held), "<expression>", "exec"), made)
     return (made["attempt"], made["dense"]) if "attempt" in made else None
 
 

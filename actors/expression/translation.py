@@ -109,7 +109,7 @@ def all_translated(
         parts.append(text if kind == FLOAT else f"float({text})")
     code = f"lambda {', '.join(places.values())}: [{', '.join(parts)}]"
     try:
-        return eval(compile(code, "<expressions>", "eval"), KNOWN), tuple(parts)
+        return eval(compile(code, "<expression>", "eval"), KNOWN), tuple(parts)
     except _NOT_TRANSLATED:
         return None
 
