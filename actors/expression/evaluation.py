@@ -217,9 +217,9 @@ class _Evaluation:
             case ast.Name():
                 return self._lookup(node)
             case ast.List() | ast.Tuple():
-                return self._weighed(node, [self.value(item) for item in node.elts])
+                return self._paid(node, [self.value(item) for item in node.elts])
             case ast.Dict():
-                return self._weighed(node, self._dict(node))
+                return self._paid(node, self._dict(node))
             case ast.UnaryOp(op=ast.Not()):
                 return not self.value(node.operand)
             case ast.UnaryOp():
@@ -227,7 +227,7 @@ class _Evaluation:
                 return self.guard(node, UNARY[type(node.op)], operand)
             case ast.BinOp():
                 left, right = self.value(node.left), self.value(node.right)
-                return self._weighed(node, self.guard(node, BINARY[type(node.op)], left, right))
+                return self._paid(node, self.guard(node, BINARY[type(node.op)], left, right))
             case ast.BoolOp():
                 decided: object = None
                 for item in node.values:
@@ -246,16 +246,21 @@ class _Evaluation:
                 if name != "len":  # whose size is known
                     for item, argument in zip(node.args, arguments, strict=True):
                         self._weighed(item, argument)
-                return self._weighed(node, self.guard(node, FUNCTIONS[name], *arguments))
+                return self._paid(node, self.guard(node, FUNCTIONS[name], *arguments))
             case ast.ListComp():
                 items: list[object] = []
                 self._comprehend(node, 0, items)
-                return self._weighed(node, items)
+                return self._paid(node, items)
             case _:
                 raise AssertionError(f"{type(node).__name__} passed the check")
 
+    def _paid(self, node: ast.expr, value: T) -> T:
+        """Pay for a value that was made, and check that it is not too long."""
+        self.guard(node, self._budget.pay, value)
+        return value
+
     def _weighed(self, node: ast.expr, value: T) -> T:
-        """Pay for a value by its size, when it is made or searched, and check that it is not too large."""
+        """Pay for a value that is searched, and check that it is not too large."""
         self.guard(node, self._budget.weigh, value)
         return value
 
@@ -268,7 +273,7 @@ class _Evaluation:
             if name in CONSTANTS:
                 raise self._error(node, f"'{name}' is a constant and cannot be the name of something else: rename it")
             value = self._names[name]
-            return self._weighed(node, list(value)) if isinstance(value, tuple) else value
+            return self._paid(node, list(value)) if isinstance(value, tuple) else value
         if name in CONSTANTS:
             return CONSTANTS[name]
         if name in FUNCTIONS:
@@ -310,7 +315,7 @@ class _Evaluation:
         if not isinstance(whole, (list, tuple, str)):
             raise self._error(node, f"only a list or a text can be sliced, not {kind_of(whole)}")
         cut = self.guard(node, operator.getitem, whole, slice(*parts))
-        return self._weighed(node, list(cut) if isinstance(cut, tuple) else cut)
+        return self._paid(node, list(cut) if isinstance(cut, tuple) else cut)
 
     def _comprehend(self, node: ast.ListComp, level: int, items: list[object]) -> None:
         if level == len(node.generators):

@@ -121,8 +121,20 @@ def _is_odd(value: Any) -> bool:
     return kind not in _PLAIN or value != value  # noqa: PLR0124  true of NaN
 
 
+def paid(value: Any, left: Left) -> Any:
+    """A value that was made, paid for by its length."""
+    kind = type(value)
+    if kind in LIGHT:
+        return value
+    size = len(value)
+    left[0] -= size // 10
+    if left[0] < 0 or size > (MAX_TEXT if kind is str else MAX_ELEMENTS):
+        undecided()
+    return value
+
+
 def weighed(value: Any, left: Left) -> Any:
-    """A value as an operand, paid for by its size."""
+    """A value that is searched as an operand, paid for by its size."""
     kind = type(value)
     if kind in LIGHT:
         return value
@@ -191,7 +203,7 @@ def cut(whole: Any, lower: Any, upper: Any, step: Any, left: Left) -> Any:
     whole = plain(whole)
     if not isinstance(whole, (list, str)) or not _OF_SLICES.issuperset(map(type, bounds)):
         undecided()
-    return weighed(whole[slice(*bounds)], left)
+    return paid(whole[slice(*bounds)], left)
 
 
 def turns(whole: Any, left: Left, steps: int) -> Any:
@@ -211,7 +223,7 @@ def _of_one(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def _of_two(function: Callable[[Any, Any], Any]) -> Callable[[Any, Any, Left], Any]:
-    return lambda first, second, left: weighed(function(plain(first), plain(second)), left)
+    return lambda first, second, left: paid(function(plain(first), plain(second)), left)
 
 
 def _joining(function: Callable[[Any, Any, Left], Any]) -> Callable[[Any, Any, Left], Any]:
@@ -219,7 +231,7 @@ def _joining(function: Callable[[Any, Any, Left], Any]) -> Callable[[Any, Any, L
 
     def add(first: Any, second: Any, left: Left) -> Any:
         both = type(first) is type(second) is list
-        return weighed([*first, *second], left) if both else function(first, second, left)
+        return paid([*first, *second], left) if both else function(first, second, left)
 
     return add
 

@@ -136,7 +136,7 @@ KNOWN: Final[dict[str, Any]] = {
     "__builtins__": {}, "type": type, "float": float, "dict": dict, "list": list, "str": str, "size": len,
     "NUMBERS": operations.NUMBERS, "LIGHT": operations.LIGHT, "power": BINARY[ast.Pow],
     "UNDECIDED": UNDECIDED, "undecided": operations.undecided,
-    "handed": operations.handed, "weighed": operations.weighed,
+    "handed": operations.handed, "paid": operations.paid, "weighed": operations.weighed,
     "sin": elementary.sin, "cos": elementary.cos, "along": along, "across": across, "looked_up": looked_up,
     "plain": operations.plain, "part": operations.part, "cut": operations.cut, "turns": operations.turns,
     **{f"by_{kind.__name__}": function for kind, function in operations.OPERATORS.items()},

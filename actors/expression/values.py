@@ -50,13 +50,21 @@ class Budget:
         if self._left < 0:
             raise BudgetError(f"{self._what} more than {self._steps:,} steps")
 
-    def weigh(self, value: object) -> None:
-        """Pay for a value by its size, or raise if it is too large."""
+    def pay(self, value: object) -> None:
+        """Pay for a value that was made, by its length, or raise if it is too long."""
         if isinstance(value, str):
             _check_text(len(value))
             self.spend(len(value) // 10)
         elif isinstance(value, (list, tuple, dict)):
+            _check_elements(len(value))
+            self.spend(len(value) // 10)
+
+    def weigh(self, value: object) -> None:
+        """Pay for a value that is searched, by its size at all levels, or raise if it is too large."""
+        if isinstance(value, (list, tuple, dict)):
             self.spend(size_of(value) // 10)
+        else:
+            self.pay(value)
 
 
 def size_of(value: object) -> int:

@@ -96,8 +96,8 @@ class Writer:
     def _tested(self, node: ast.expr) -> str:
         return _test(self.settled(node))
 
-    def _weighed(self, text: str) -> Written:
-        return f"weighed({text}, {self._left()})", ANY
+    def _weighed(self, text: str) -> str:
+        return f"weighed({text}, {self._left()})"
 
     # -- nodes ----------------------------------------------------------------------------------------------------
 
@@ -113,8 +113,7 @@ class Writer:
                 return self._names[name], self._kinds[name]
             case ast.List() | ast.Tuple():
                 parts = [self.settled(each) for each in node.elts]
-                text = f"[{', '.join(text for text, _ in parts)}]"
-                return self._weighed(text) if ANY in {kind for _, kind in parts} else (text, ANY)
+                return f"[{', '.join(text for text, _ in parts)}]", ANY
             case ast.Dict():
                 return self._dict(node)
             case ast.UnaryOp(op=ast.Not()):
@@ -169,7 +168,7 @@ class Writer:
         if not all(isinstance(key, str) for key in keys) or len({*keys}) < len(keys):
             raise UntranslatableError
         items = zip(keys, map(self.settled, node.values), strict=True)
-        return self._weighed(f"{{{', '.join(f'{key!r}: {text}' for key, (text, _) in items)}}}")
+        return f"{{{', '.join(f'{key!r}: {text}' for key, (text, _) in items)}}}", ANY
 
     def _signed(self, node: ast.UnaryOp) -> Written:
         text, kind = self._write(node.operand)
@@ -274,12 +273,12 @@ class Writer:
         if name == "len" and len(parts) == 1:
             first, again = self._named(parts[0][0])
             return f"(size({again}) if type({first}) is list else f_len({again}))", NUMBER
-        texts = [text if kind != ANY else self._weighed(text)[0] for text, kind in parts]
+        texts = [text if kind != ANY else self._weighed(text) for text, kind in parts]
         text = f"f_{name}({', '.join(texts)})"
         if name == "bool":
             return text, _TRUTH
         is_number = name in _GIVE_NUMBERS or (name in ("min", "max") and {kind for _, kind in parts} <= {FLOAT, NUMBER})
-        return (text, NUMBER) if is_number else self._weighed(text)
+        return (text, NUMBER) if is_number else (f"paid({text}, {self._left()})", ANY)
 
     def _interpolated(self, arguments: list[ast.expr]) -> Written | None:
         """A table of constants, which is checked here once."""
@@ -320,7 +319,7 @@ class Writer:
             f"([{text} for {item} in {source}{''.join(conditions)}] "
             f"if ({source} := turns({whole}, {self._left()}, {steps})) else [])"
         )
-        return self._weighed(text) if kind == ANY else (text, ANY)
+        return text, ANY
 
 
 def _test(written: Written) -> str:
