@@ -94,7 +94,7 @@ class Trajectory:
                 return None
             try:
                 rest, factor = (
-                    number_of(factors[each], self._held, "") if each in factors else 0.0 for each in (REST, name)
+                    number_of(factors[each], self._held) if each in factors else 0.0 for each in (REST, name)
                 )
             except EpicycleError:  # the derivative itself says what is wrong
                 return None
@@ -169,7 +169,7 @@ class Trajectory:
             else:
                 return found
         names = self.values(at, state)
-        return [number_of(formula, names, f"derivative of {name}") for name, formula in self._formulas.items()]
+        return [number_of(formula, names, "derivative of", name) for name, formula in self._formulas.items()]
 
     def _bounds(self, formula: Formula, left: float, right: float, states: Sequence[Bounds]) -> Bounds:
         """The bounds of a formula from one time of the present solution to another."""
@@ -198,12 +198,15 @@ def _unrolled(
     return (made["attempt"], made["dense"]) if "attempt" in made else None
 
 
-def number_of(formula: Formula, names: Mapping[str, Any], what: str) -> float:
-    """The value of a formula, which must be a number; messages call it ``what``."""
+def number_of(formula: Formula, names: dict[str, Any], *what: object) -> float:
+    """The value of a formula, which must be a number; messages call it ``what``, in these words."""
     try:
-        result = formula(names)
-    except EpicycleError as error:
-        raise EpicycleError(f"{what}: {error}") from None
+        result = formula.of(names)
+    except UNDECIDED:
+        try:
+            result = formula(names)
+        except EpicycleError as error:
+            raise EpicycleError(f"{' '.join(map(str, what))}: {error}") from None
     if isinstance(result, bool) or not isinstance(result, (int, float)):
-        raise EpicycleError(f"{what}: {formula} gives {result!r}, which is not a number")
+        raise EpicycleError(f"{' '.join(map(str, what))}: {formula} gives {result!r}, which is not a number")
     return float(result)

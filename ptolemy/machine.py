@@ -39,7 +39,7 @@ class StateMachine(actors.StateMachine):
 
     def begins(self) -> None:
         self.commits()
-        self.follow(self._choose(self._chart.immediate[self._current]))
+        self.follow(self._choose(self._exits.immediate))
         self._reacted = None
         super().begins()
 

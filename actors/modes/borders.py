@@ -34,11 +34,12 @@ class Borders:
         self._trajectory: Trajectory | None = None
         self._trajectories: dict[tuple[str, int], Trajectory] = {}  # of all modes so far
         self._watched: list[Comparison] = []  # in the order of the trajectory's guards
-        self._deadlines: dict[Comparison, int] = {}  # of comparisons that only wait for a time
+        self._deadlines: list[tuple[int, Comparison]] = []  # of comparisons that only wait for a time
         self._seen = 0  # time of the last update
         self._open: dict[Comparison, int] = {}  # put on their border by a transition: the side they came from
         self._passed: dict[Formula, int] = {}  # what crosses now, and towards which side
         self._before: dict[str, Any] = {}  # the variables at the crossing
+        self.is_still = True  # whether nothing changes with time
 
     def enter(self, mode: str, flow: Mapping[str, Formula], comparisons: Sequence[Comparison], now: int) -> None:
         """Enter a mode with the present values of the variables."""
@@ -47,20 +48,18 @@ class Borders:
             origin = self._trajectory.time, self._trajectory.fraction
         self._mode, self._flow, self._all, self._entered, self._seen = mode, flow, comparisons, now, now
         self._open = {}
-        if comparisons or flow:
-            self._begin(origin, now)
-        else:
-            self._watched, self._deadlines, self.truths, self._trajectory = [], {}, {}, None
+        self.is_still = not (flow or comparisons or self._passed)
+        self._begin(origin, now)
 
     def _begin(self, origin: tuple[int, float], now: int) -> None:
-        self._watched, self._deadlines, self.truths, self._trajectory = [], {}, {}, None
+        self._watched, self._deadlines, self.truths, self._trajectory = [], [], {}, None
         for each in self._all:
             if not each.names <= self._known.keys():
                 continue
             if each.until is None:
                 self._watched.append(each)
             else:
-                self._deadlines[each] = self._deadline(each, *each.until)
+                self._deadlines.append((self._deadline(each, *each.until), each))
         self._judge_times(now)
         if not (self._flow or self._watched):
             return
@@ -83,7 +82,7 @@ class Borders:
         return trajectory
 
     def _deadline(self, comparison: Comparison, clock: str, until: Formula, side: int) -> int:
-        seconds = number_of(until, self._known, repr(comparison.source))
+        seconds = number_of(until, self._known, comparison)
         at = NEVER if seconds > _LONGEST else to_nanoseconds(seconds)
         return min(at + (self._entered if clock == "mode_time" else 0), NEVER)
 
@@ -111,19 +110,22 @@ class Borders:
         """Bring variables and comparisons up to date; return whether a comparison changes now."""
         self._passed, trajectory = {}, self._trajectory
         has_changed, seen, self._seen = False, self._seen, now
-        for time in self._deadlines.values():
+        for time, _ in self._deadlines:
             if seen <= time <= now:
                 has_changed = has_changed or seen < time
                 self._judge_times(now)
         if trajectory is None:
+            self.is_still = not self._all
             return has_changed
         solution, at = trajectory.solution, trajectory.elapsed(now)
-        if self._watched:
-            solution.search(at)
-            crossing = solution.crossing
-            if crossing is not None and trajectory.moment(crossing.time) <= now:
-                self._cross(trajectory, crossing.time, crossing.sides)
-                return True
+        if not self._watched:
+            self._keep(trajectory, solution.at(at))
+            return has_changed
+        solution.search(at)
+        crossing = solution.crossing
+        if crossing is not None and trajectory.moment(crossing.time) <= now:
+            self._cross(trajectory, crossing.time, crossing.sides)
+            return True
         self._keep(trajectory, solution.at(at))
         self._judge(trajectory, at)
         return has_changed
@@ -146,21 +148,19 @@ class Borders:
 
     def next_time(self, now: int) -> int | None:
         """When to check again: when a comparison changes or, if none is known to change, where the search ends."""
-        if not self._all:
-            return None
-        looks = [time for time in self._deadlines.values() if now < time < NEVER]
+        looks = [time for time, _ in self._deadlines if now < time < NEVER]
         if self._trajectory is not None and self._watched:
             looks.append(self._trajectory.next_look(now))
-        return min(looks, default=None)
+        return min(looks) if looks else None
 
     # -- which comparisons hold -----------------------------------------------------------------------------------
 
     def _judge_times(self, now: int) -> None:
-        for comparison, time in self._deadlines.items():
+        for time, comparison in self._deadlines:
             assert comparison.until is not None
             side = comparison.until[2] if now >= time else -comparison.until[2]
             side = 0 if now == time and comparison.is_equality else side
-            self.truths[comparison.name] = float(comparison.holds(side))
+            self.truths[comparison.name] = comparison.holds(side)
 
     def _judge(self, trajectory: Trajectory, at: float) -> None:
         for comparison, guard in zip(self._watched, trajectory.guards, strict=True):
@@ -174,4 +174,4 @@ class Borders:
                 )
             if comparison.difference in self._passed and comparison.is_equality:
                 side = 0  # which is where it crosses
-            self.truths[comparison.name] = float(comparison.holds(side))
+            self.truths[comparison.name] = comparison.holds(side)

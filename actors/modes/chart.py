@@ -43,6 +43,40 @@ class Rule:
 Leaving = tuple[tuple[Rule, ...], ...]  # transitions, those of a later part only if none of the earlier ones is enabled
 
 
+@dataclass(frozen=True, slots=True)
+class Exits:
+    """The transitions that leave a mode, by the occasion on which they are looked at."""
+
+    preemptive: Leaving
+    others: Leaving
+    immediate: Leaving
+    delayed: tuple[Rule, ...]
+    racing: tuple[Rule, ...]
+    alone: tuple[Rule, ...]  # that need neither a token nor a time
+
+    @classmethod
+    def of(cls, rules: Sequence[Rule]) -> Exits:
+        """Those among the transitions that leave one mode."""
+
+        def those(of_a_kind: Callable[[Rule], bool]) -> tuple[Rule, ...]:
+            return tuple(filter(of_a_kind, rules))
+
+        def apart(found: tuple[Rule, ...]) -> Leaving:
+            parts = (tuple(each for each in found if each.otherwise is late) for late in (False, True))
+            return tuple(filter(None, parts))
+
+        return cls(
+            preemptive=apart(those(lambda rule: rule.preemptive)),
+            others=apart(those(lambda rule: not rule.preemptive and rule.rate is None)),
+            immediate=apart(those(lambda rule: rule.immediate)),
+            delayed=those(lambda rule: rule.delay is not None),
+            racing=those(lambda rule: rule.rate is not None),
+            alone=those(
+                lambda rule: not (rule.otherwise or rule.on or rule.error) and rule.rate is None and rule.delay is None
+            ),
+        )
+
+
 class Chart:
     """The modes of a machine and the transitions that leave each; raises ``ParameterError`` if they do not fit."""
 
@@ -66,26 +100,10 @@ class Chart:
                 faults += error.faults
         if faults:
             raise ParameterError.several(faults)
-        self.immediate = self._apart(lambda rule: rule.immediate)
-        self.racing = self._those(lambda rule: rule.rate is not None)
-        self.delayed = self._those(lambda rule: rule.delay is not None)
-        self.alone = self._those(lambda rule: not (rule.otherwise or rule.on or rule.error or rule.rate is not None))
-        unhurried = self._apart(lambda rule: not rule.preemptive and rule.rate is None)
-        self.phases = self._apart(lambda rule: rule.preemptive), unhurried
+        self.exits = {mode: Exits.of(leaving) for mode, leaving in self.leaving.items()}
         self._check_reach()
         for mode, leaving in self.leaving.items():
             self._check_clear(mode, leaving)
-
-    def _those(self, of_a_kind: Callable[[Rule], bool]) -> dict[str, tuple[Rule, ...]]:
-        return {mode: tuple(filter(of_a_kind, leaving)) for mode, leaving in self.leaving.items()}
-
-    def _apart(self, of_a_kind: Callable[[Rule], bool]) -> dict[str, Leaving]:
-        """The same in two parts: those that come first, and those that are for when none of these is enabled."""
-        found = {}
-        for mode, rules in self._those(of_a_kind).items():
-            parts = (tuple(each for each in rules if each.otherwise is late) for late in (False, True))
-            found[mode] = tuple(filter(None, parts))
-        return found
 
     def _known(self, where: str, mode: str, *keys: str | int) -> str:
         if mode not in self.modes:

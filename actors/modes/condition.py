@@ -18,33 +18,29 @@ _ON_SIDES: Final[dict[type[ast.cmpop], tuple[int, ...]]] = {
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A comparison in a guard: the difference that is zero where it changes, and whether it holds on each side."""
+    """A comparison in a guard: the difference that is zero where it changes, and the sides on which it holds."""
 
     source: str
     name: str  # its placeholder in the guard
     difference: Formula
-    sign: type[ast.cmpop]
+    sides: tuple[int, ...]
+    is_equality: bool
     names: frozenset[str]  # that it uses, except times
     until: tuple[str, Formula, int] | None = None  # a time, the value at which it changes, and the side from then on
 
-    @property
-    def is_equality(self) -> bool:
-        return self.sign in (ast.Eq, ast.NotEq)
+    def __str__(self) -> str:
+        return repr(self.source)
 
-    def holds(self, side: int) -> bool:
-        return side in _ON_SIDES[self.sign]
-
-
-@dataclass(frozen=True)
-class Condition:
-    """A guard in which names replace the comparisons whose changes are events."""
-
-    formula: Formula
-    comparisons: tuple[Comparison, ...]
+    def holds(self, side: int) -> float:
+        """1 on a side on which it holds, otherwise 0."""
+        return 1.0 if side in self.sides else 0.0
 
 
-def condition_of(guard: Formula, moving: Collection[str], numbers: Collection[str], taken: int) -> Condition:
-    """A guard whose comparisons over ``moving`` values, and otherwise only ``numbers``, are replaced by names.
+def condition_of(
+    guard: Formula, moving: Collection[str], numbers: Collection[str], taken: int
+) -> tuple[Formula, list[Comparison]]:
+    """A guard in which names replace the comparisons whose changes are events: those over ``moving`` values, and
+    otherwise only ``numbers``.
 
     ``taken`` is the number of comparisons in other guards of the mode; it keeps names unique.
     """
@@ -64,14 +60,15 @@ def condition_of(guard: Formula, moving: Collection[str], numbers: Collection[st
             text = source[parts[place].col_offset : parts[place + 1].end_col_offset]
             until = _until(parts[place], parts[place + 1], written[place : place + 2], moving)
             asked = frozenset(difference.names) - {*TIMES}
-            stand_ins.append(Comparison(text, name, difference, type(sign), asked, until))
+            is_equality = isinstance(sign, (ast.Eq, ast.NotEq))
+            stand_ins.append(Comparison(text, name, difference, _ON_SIDES[type(sign)], is_equality, asked, until))
         else:
             found += stand_ins
             text = " and ".join(each.name for each in stand_ins)
             pieces.append((node.col_offset, node.end_col_offset or 0, f"({text})"))
     for start, end, text in sorted(pieces, reverse=True):
         source = source[:start] + text + source[end:]
-    return Condition(Formula(source), tuple(found))
+    return Formula(source), found
 
 
 def _until(

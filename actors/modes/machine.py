@@ -25,7 +25,7 @@ from ..integration import STEPPERS, check_step
 from ..trajectory import number_of
 from .borders import Borders
 from .chart import Chart, Rule
-from .condition import TIMES, Comparison, Condition, condition_of, type_of
+from .condition import TIMES, Comparison, condition_of, type_of
 from .guard import is_true
 from .modal import ModalActor
 from .text import Action, ModesParameter, TransitionsParameter
@@ -151,7 +151,7 @@ class StateMachine(ModalActor):
         check_step(self.method, self.max_step)
         rules = [
             Rule(
-                each.from_, each.to, each.on, each.when, each.after, each.probability, each.do or None,
+                each.from_, each.to, each.on, each.when, each.after, each.probability, each.do,
                 each.priority, each.else_, each.immediate, each.nondeterministic,
                 each.preemptive, each.history, each.error, each.rate, place,
             )
@@ -168,16 +168,18 @@ class StateMachine(ModalActor):
             for variable in mode.flow:
                 _check_name(("modes", name, "flow", variable), variable, "variable", self.variables)
         numbers = {*self.held, *self.variables}
-        self._conditions: dict[str, dict[Rule, Condition]] = {}
+        self._conditions: dict[str, dict[Rule, Formula]] = {}  # guards with names in the place of comparisons
         self._comparisons: dict[str, tuple[Comparison, ...]] = {}
         for name, mode in self.modes.items():
-            moving, taken = {*mode.flow, *TIMES}, 0
+            moving = {*mode.flow, *TIMES}
             found = self._conditions[name] = {}
+            watched: list[Comparison] = []
             for rule in self._chart.leaving[name]:
                 if rule.guard is not None:
-                    found[rule] = condition_of(rule.guard, moving, numbers, taken)
-                    taken += len(found[rule].comparisons)
-            self._comparisons[name] = tuple(each for one in found.values() for each in one.comparisons)
+                    found[rule], comparisons = condition_of(rule.guard, moving, numbers, len(watched))
+                    watched += comparisons
+            self._comparisons[name] = tuple(watched)
+        self._still = frozenset(name for name, mode in self.modes.items() if not (mode.flow or self._comparisons[name]))
         rules = [rule for leaving in self._chart.leaving.values() for rule in leaving]
         self.is_preemptive = any(rule.preemptive for rule in rules)
         read = [each for rule in rules for each in (rule.guard, rule.delay, rule.probability, rule.rate) if each]
@@ -203,6 +205,7 @@ class StateMachine(ModalActor):
         self._tokens: dict[str, Any] = {}  # of the present reaction
         self._scope: dict[str, Any] = {}  # what names mean in it
         self._entered = self.context.time
+        self._guards = self._conditions[self._current]
         self._borders = Borders(
             self._known,
             method=self.method,
@@ -218,7 +221,7 @@ class StateMachine(ModalActor):
         self._prepare()
         if self._is_to_react:
             self._look()
-            self.react(self._chart.phases[:1])
+            self.react(preempts=True)
         return self._reacted == self.tag
 
     def _prepare(self) -> None:
@@ -226,7 +229,7 @@ class StateMachine(ModalActor):
         tag = self.context.tag
         if self._prepared != tag:
             self._prepared = tag
-            self._has_changed = self._borders.advance(self.context.time)
+            self._has_changed = not self._borders.is_still and self._borders.advance(self.context.time)
         if self.held and self._tokens:
             self._hold_tokens()
 
@@ -252,7 +255,7 @@ class StateMachine(ModalActor):
         self._prepare()
         if self._is_to_react:
             self._look()
-            self.react(self._chart.phases)
+            self.react()
             if self.error is not None and self.refinements is not None:
                 self.refinements.raise_failure()
         if self._is_new:
@@ -264,7 +267,8 @@ class StateMachine(ModalActor):
             self._tell()
         self._tokens, self._scope = {}, {}
         self.rests()
-        self._watch()
+        if self._wake is not None or not self._borders.is_still:
+            self._watch()
 
     def _watch(self) -> None:
         """Be woken when a comparison changes."""
@@ -319,32 +323,28 @@ class StateMachine(ModalActor):
     def hears(self, rule: Rule) -> bool:
         return not self._tokens.keys().isdisjoint(rule.on)
 
-    def moves(self, rule: Rule) -> None:
+    def _take(self, rule: Rule) -> None:
+        self._act(self.modes[self._current].exit)
+        self._act(rule.act)
+        self.error = None
         if self.refinements is not None:
             self.refinements.change(rule.target, history=rule.history)
+        self._enter(rule.target)
 
     def enters(self, mode: str) -> None:
         if self._catches:  # a transition has handled it
             self._scope["error"] = ""
-        if actions := self.modes[mode].entry:
-            self._act(actions)
-        self._entered, scope = self.context.time, self._scope
-        for name in self._borders.truths:
-            scope.pop(name, None)
-        self._enter_borders(mode)
-        if self._borders.truths:
-            scope.update(self._borders.truths)
-        scope["mode_time"] = 0.0
+        self._act(self.modes[mode].entry)
+        self._entered, self._guards = self.context.time, self._conditions[mode]
+        if not (self._borders.is_still and mode in self._still):
+            self._enter_borders(mode)
+        self._scope["mode_time"] = 0.0
 
     def _enter_borders(self, mode: str) -> None:
+        for name in self._borders.truths:
+            self._scope.pop(name, None)
         self._borders.enter(mode, self.modes[mode].flow, self._comparisons[mode], self._entered)
-
-    def leaves(self, mode: str) -> None:
-        if actions := self.modes[mode].exit:
-            self._act(actions)
-
-    def act(self, rule: Rule) -> None:
-        self._act(rule.act)
+        self._scope.update(self._borders.truths)
 
     def _act(self, actions: tuple[Action, ...]) -> None:
         for name, formula in actions:
@@ -366,18 +366,18 @@ class StateMachine(ModalActor):
             return formula.decided(self._values(formula))
 
     def probability_of(self, rule: Rule) -> float:
-        found = number_of(rule.probability, self._values(rule.probability), f"{rule} probability")
+        found = self._number_of(rule.probability, rule, "probability")
         if not 0.0 <= found <= 1.0:
             raise EpicycleError(f"{rule}: {found:g} is not a probability, which is from 0 to 1")
         return found
 
     def delay_of(self, rule: Rule) -> float:
-        return number_of(rule.delay, self._values(rule.delay), f"{rule} after")
+        return self._number_of(rule.delay, rule, "after")
 
     def holds(self, rule: Rule) -> bool:
         if rule.guard is None:
             return True
-        condition = self._conditions[self._current][rule].formula
+        condition = self._guards[rule]
         try:
             found = condition.of(self._scope)
         except UNDECIDED:
@@ -391,7 +391,7 @@ class StateMachine(ModalActor):
             return is_true(rule.guard, self._scope)  # which reports the error in the model's terms
 
     def goes_on(self) -> bool:
-        if not self._chart.alone[self._current]:
+        if not self._exits.alone:
             return False
         if self._tokens:
             self._look_ahead()
@@ -407,10 +407,17 @@ class StateMachine(ModalActor):
         self._look()
 
     def rate_of(self, rule: Rule) -> float:
-        found = number_of(rule.rate, self._values(rule.rate), f"{rule} rate")
+        found = self._number_of(rule.rate, rule, "rate")
         if not 0.0 <= found < inf:
             raise EpicycleError(f"{rule}: {found:g} is not a rate, which is a number >= 0")
         return found
+
+    def _number_of(self, formula: Formula, *what: object) -> float:
+        try:
+            found = formula.of(self._scope)
+        except UNDECIDED:
+            found = None
+        return found if type(found) is float else number_of(formula, self._values(formula), *what)
 
     def _values(self, formula: Formula) -> dict[str, Any]:
         """The present values of the names in an expression, without inputs that have no token."""

@@ -26,7 +26,7 @@ Source: E. A. Lee and S. Tripakis, "Modal Models in Ptolemy" (2010); Ptolemy: ``
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import fsum
 from typing import Any, Final, TypeVar
@@ -73,6 +73,11 @@ class ModalActor(Actor):
         methods = _methods(type(self)).items()
         found = [replace(rule, act=name) for name, each in methods for rule in getattr(each, "_transitions", ())]
         self._chart = Chart(self.modes, self.initial, self.final, found)
+        self._calls = {
+            (mark, mode): [name for name, each in methods if mode in getattr(each, mark, ())]
+            for mark in ("_entry_of", "_exit_of")
+            for mode in self.modes
+        }
         for rule in found:
             for name in rule.on:
                 if name not in self.inputs:
@@ -107,33 +112,22 @@ class ModalActor(Actor):
         """How often (1/s) a transition comes while its guard holds."""
         return float(rule.rate(self) if callable(rule.rate) else rule.rate)
 
-    def act(self, rule: Rule) -> None:
-        """The actions of a transition."""
-        getattr(self, rule.act)()
-
-    def moves(self, rule: Rule) -> None:
-        """Apply what changes along with the mode."""
-
     def enters(self, mode: str) -> None:
         """The entry actions of a mode."""
-        self._call("_entry_of", mode)
+        for name in self._calls["_entry_of", mode]:
+            getattr(self, name)()
 
     def leaves(self, mode: str) -> None:
         """The exit actions of a mode."""
-        self._call("_exit_of", mode)
+        for name in self._calls["_exit_of", mode]:
+            getattr(self, name)()
 
     def commits(self) -> None:
         """Finish a reaction after all its transitions."""
 
     def goes_on(self) -> bool:
         """Whether it must react again at the next microstep without a token."""
-        alone = self._chart.alone[self._current]
-        return bool(alone) and any(self._is_open(rule) and self.holds(rule) for rule in alone)
-
-    def _call(self, mark: str, mode: str) -> None:
-        for name, method in _methods(type(self)).items():
-            if mode in getattr(method, mark, ()):
-                getattr(self, name)()
+        return any(map(self.holds, self._exits.alone))
 
     # -- the run --------------------------------------------------------------------------------------------------
 
@@ -144,14 +138,15 @@ class ModalActor(Actor):
 
     def initialize(self) -> None:
         self._current = self._chart.initial
+        self._exits = self._chart.exits[self._current]
         self._is_begun = False
         self._is_new = False  # whether it has entered a mode in this firing
         self._reacted: Tag | None = None  # tag of the latest transition
         self._timers: dict[Rule, Wake | None] = {}  # of delays; None after the end
         self._again: Wake | None = self.wake_in(0)  # wake-up for another reaction
-        self._drawn: dict[Rule, bool] = {}  # in this firing, by transition with a probability
-        self._number: float | None = None  # the random number for them, and the range used up
-        self._used = 0.0
+        self._number: float | None = None  # drawn in this firing for transitions with a probability
+        self._used = 0.0  # of the range from 0 to 1
+        self._drawn: dict[Rule, bool] = {}  # which of them it selects
         self._rates: dict[Rule, float] = {}  # of the transitions that race, and when the first one comes
         self._first: Wake | None = None
         self.error: str | None = None  # of the failed refinement of the mode
@@ -169,25 +164,25 @@ class ModalActor(Actor):
         return False
 
     def fire(self) -> None:
-        self.react(self._chart.phases)
+        self.react()
         self.finish()
 
-    def react(self, phases: Sequence[Mapping[str, Leaving]]) -> None:
-        """React, once per tag, with the first phase in which a transition is enabled."""
-        chart = self._chart
+    def react(self, *, preempts: bool = False) -> None:
+        """React, once per tag; while it ``preempts``, only preemptive transitions can be taken."""
         if not self._is_begun:
             self._is_begun = True
-            self._enter(chart.initial)
+            self._enter(self._chart.initial)
             self.begins()
         elif self._reacted == self.context.tag:
             return
-        rule = None
-        for phase in phases:
-            if rule is None and (leaving := phase[self._current]):
-                rule = self._choose(leaving)
-        if rule is None and phases is chart.phases and self.is_due(self._first) and self.error is None:
-            rule = self._winner()
-        self.follow(rule)
+        exits = self._exits
+        rule = self._choose(exits.preemptive) if exits.preemptive else None
+        if rule is None and not preempts:
+            rule = self._choose(exits.others)
+            if rule is None and self._first is not None and self.error is None and self.is_due(self._first):
+                rule = self._winner()
+        if rule is not None:
+            self.follow(rule)
 
     def begins(self) -> None:
         """Called when the first mode has been entered."""
@@ -203,8 +198,8 @@ class ModalActor(Actor):
                 raise EpicycleError(f"{MOST_IMMEDIATE:,} immediate transitions in one reaction: {way} -> ...")
             self._reacted = self.context.tag
             self._take(rule)
-            leaving = self._chart.immediate[self._current]
-            rule = self._choose(leaving) if leaving else None
+            immediate = self._exits.immediate
+            rule = self._choose(immediate) if immediate else None
         if taken:
             self.commits()
             self._begin_delays()
@@ -216,8 +211,8 @@ class ModalActor(Actor):
                 self._timers[rule] = None
         if self._again is not None and self.is_due(self._again):
             self._again = None
-        self._drawn, self._number = {}, None
-        if self._rates or self._chart.racing[self._current]:
+        self._number = None
+        if self._rates or self._exits.racing:
             self.race()
         if self._is_new:
             self._is_new = False
@@ -227,7 +222,7 @@ class ModalActor(Actor):
 
     def race(self) -> None:
         """Draw when the first of the transitions with rates comes, if that is open: rates have no memory."""
-        rates = {rule: self.rate_of(rule) for rule in self._chart.racing[self._current] if self.holds(rule)}
+        rates = {rule: self.rate_of(rule) for rule in self._exits.racing if self.holds(rule)}
         if rates == self._rates and not self._is_new and not self.is_due(self._first):
             return
         if self._first is not None:
@@ -263,9 +258,9 @@ class ModalActor(Actor):
         """Whether the number drawn in this firing selects a transition; always true without a probability."""
         if rule.probability is None:
             return True
+        if self._number is None:
+            self._number, self._used, self._drawn = self.random_stream("probability").random(), 0.0, {}
         if rule not in self._drawn:
-            if self._number is None:
-                self._number, self._used = self.random_stream("probability").random(), 0.0
             low, self._used = self._used, self._used + self.probability_of(rule)
             if self._used > 1.0 + _ROUNDING:
                 raise EpicycleError(
@@ -277,15 +272,13 @@ class ModalActor(Actor):
         return self._drawn[rule]
 
     def _choose(self, rules: Leaving) -> Rule | None:
-        enabled: list[Rule] = []
         for those in rules:
-            for rule in those:
-                if self._is_enabled(rule):
-                    enabled.append(rule)
-            if enabled:
+            if enabled := [rule for rule in those if self._is_enabled(rule)]:
                 break
-        if len(enabled) < 2:
-            return enabled[0] if enabled else None
+        else:
+            return None
+        if len(enabled) == 1:
+            return enabled[0]
         first = min(rule.priority for rule in enabled)
         enabled = [rule for rule in enabled if rule.priority == first]
         if len(enabled) == 1:
@@ -299,10 +292,8 @@ class ModalActor(Actor):
 
     def _take(self, rule: Rule) -> None:
         self.leaves(self._current)
-        if rule.act is not None:
-            self.act(rule)
+        getattr(self, rule.act)()
         self.error = None
-        self.moves(rule)
         self._enter(rule.target)
 
     def _enter(self, mode: str) -> None:
@@ -311,12 +302,12 @@ class ModalActor(Actor):
                 if wake is not None:
                     wake.cancel()
             self._timers = {}
-        self._drawn, self._number = {}, None
-        self._current, self._is_new = mode, True
+        self._number = None
+        self._current, self._exits, self._is_new = mode, self._chart.exits[mode], True
         self.enters(mode)
 
     def _begin_delays(self) -> None:
-        if delayed := self._chart.delayed[self._current]:
+        if delayed := self._exits.delayed:
             self._timers = {rule: self.wake_in(self.delay_of(rule)) for rule in delayed}
 
 

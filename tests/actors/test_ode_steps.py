@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from epicycle.actors import trajectory
-from epicycle.actors.expression import Formula, evaluate
+from epicycle.actors.expression import Formula
 from epicycle.actors.integration import STEPPERS
 from epicycle.runner import load_model
 from epicycle.runner.execution.engine import Simulation
@@ -59,13 +59,14 @@ def test_what_is_short_does_not_hide_in_a_long_step(actor: dict[str, Any], times
 def formulas_evaluated(monkeypatch: pytest.MonkeyPatch, actor: dict[str, Any], until: float) -> int:
     count = 0
 
-    def counted(formula: Formula, values: Any) -> Any:
+    def counted(formula: Formula, values: dict[str, Any], *what: object) -> float:
         nonlocal count
         count += 1
-        return evaluate(formula.source, values)
+        return number_of(formula, values, *what)
 
+    number_of = trajectory.number_of
     with monkeypatch.context() as patch:
-        patch.setattr(Formula, "__call__", counted)
+        patch.setattr(trajectory, "number_of", counted)
         patch.setattr(trajectory, "all_translated", lambda *_: None)
         feed(actor, {"trigger": ticks(until / 100, until)}, until=until)
     return count

@@ -117,7 +117,7 @@ def as_class(machine: dict[str, Any]) -> type[ModalActor]:
         self.tokens = {port: queue.pop(0) for port, queue in self.queues.items() if queue}
         looked = any(self.is_due(wake) for wake in self.looks)
         if self.tokens or self.is_called or looked:
-            self.react(self._chart.phases)
+            self.react()
         self.alone = True
         self.finish()
         self.alone, self.tokens = False, {}
