@@ -1,6 +1,7 @@
-from epicycle.actors.core.moment cimport Moment, Wake, new_wake
 from epicycle.actors.core.order cimport TimedQueue, ReadyQueue
 from epicycle.actors.core.port_parameter cimport ParameterPort
 from epicycle.actors.core.ports cimport Emitter, InputPort, OutputPort, Receiver
 from epicycle.actors.core.primitives cimport is_alone
-from epicycle.actors.core.tag cimport nanoseconds_of, seconds_of, to_nanoseconds, to_seconds
+from epicycle.actors.core.tag cimport (
+    Moment, Wake, nanoseconds_of, new_wake, seconds_of, to_nanoseconds, to_seconds,
+)

@@ -23,7 +23,6 @@ LIBRARIES = {
     "kernel": (
         "epicycle.actors.core.primitives",
         "epicycle.actors.core.tag",
-        "epicycle.actors.core.moment",
         "epicycle.actors.core.order",
         "epicycle.actors.core.ports",
         "epicycle.actors.core.parameter",
@@ -43,13 +42,13 @@ LIBRARIES = {
         "epicycle.runner.execution.engine.listeners",
     ),
     "forms": ("epicycle.runner.execution.engine.forms",),
-    # Pays where thousands of runs are to come.
-    "robots": (
-        "epicycle.actors.robotics.arrays",
-        "epicycle.actors.robotics.history",
-        "epicycle.actors.robotics.estimator",
-        "epicycle.actors.robotics.controller",
+    # Pay where thousands of runs are to come.
+    "machines": (
+        "epicycle.actors.expression.operations",
+        "epicycle.actors.modes.modal",
+        "epicycle.actors.modes.machine",
     ),
+    "robots": ("epicycle.actors.robotics.arrays", "epicycle.actors.robotics.history"),
 }
 CORE_LIBRARIES = ("kernel", "record", "forms")  # the others are built on them
 CORE_MODULES = tuple(module for modules in LIBRARIES.values() for module in modules)

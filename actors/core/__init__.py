@@ -21,7 +21,6 @@ from .messages import (
     visible_character,
     visible_lines,
 )
-from .moment import Moment, Wake, new_wake
 from .order import NEVER, ReadyQueue, TimedQueue
 from .parameter import (
     REQUIRED,
@@ -43,7 +42,17 @@ from .primitives import is_alone
 from .process import Process
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
 from .random import Stream, Streams, random_stream
-from .tag import NANOSECONDS_PER_SECOND, Tag, below_nanoseconds, new_tag, to_nanoseconds, to_seconds
+from .tag import (
+    NANOSECONDS_PER_SECOND,
+    Moment,
+    Tag,
+    Wake,
+    below_nanoseconds,
+    new_tag,
+    new_wake,
+    to_nanoseconds,
+    to_seconds,
+)
 from .units import UnitError, convert, in_si, parse_unit, units_like
 
 __all__ = [

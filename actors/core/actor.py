@@ -34,12 +34,11 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Protocol, Self, cast
 from weakref import WeakKeyDictionary
 
-from .moment import Wake
 from .parameter import Configurable, ParameterError
 from .port_parameter import ParameterPort, PortParameter
 from .ports import InputPort, OutputPort, PortError
 from .random import Stream, Streams
-from .tag import Tag, to_nanoseconds, to_seconds
+from .tag import Tag, Wake, to_nanoseconds, to_seconds
 
 
 class Context(Protocol):

@@ -1,7 +1,7 @@
 # Types for C; order.py documents everything.
 
 cimport cython
-from epicycle.actors.core.moment cimport Wake
+from epicycle.actors.core.tag cimport Wake
 
 
 @cython.final

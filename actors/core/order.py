@@ -9,7 +9,7 @@ from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .moment import Wake
+    from .tag import Wake
 
 NEVER = 2**63 - 1  # ns
 

@@ -3,7 +3,7 @@
 
 from cpython.mem cimport PyMem_Free, PyMem_Malloc, PyMem_Realloc
 
-from epicycle.actors.core.moment cimport Wake
+from epicycle.actors.core.tag cimport Wake
 
 NEVER = 2**63 - 1
 cdef long long LAST = 2**63 - 1

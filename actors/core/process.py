@@ -19,8 +19,8 @@ from simpy.events import Process as SimPyProcess
 
 from .actor import Actor
 from .environment import end, settle
-from .moment import Wake
 from .ports import InputPort
+from .tag import Wake
 
 
 class Process(Actor):

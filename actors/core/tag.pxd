@@ -21,3 +21,20 @@ cdef inline double seconds_of(long long nanoseconds) except? -1.0:
 @cython.locals(product=cython.double)
 cpdef to_nanoseconds(seconds)
 cpdef to_seconds(nanoseconds)
+
+
+@cython.freelist(64)
+cdef class Wake:
+    cdef public long long time
+    cdef public long microstep
+    cdef public bint cancelled, due
+
+
+cdef class Moment:
+    cdef public long long time
+    cdef public long microstep
+    cdef public object _tag
+
+
+@cython.locals(wake=Wake)
+cpdef Wake new_wake(long long time, long microstep)

@@ -87,8 +87,8 @@ def test_a_core_that_cannot_be_had() -> None:
         (lambda root: None, ""),
         (lambda root: (root / MODULE["MANIFEST"]).unlink(), MISSING),
         (lambda root: (root / MODULE["MANIFEST"]).write_text("{"), MISSING),
-        (lambda root: (root / "actors/core/moment.py").write_text("changed"), CHANGED),
-        (lambda root: (root / "actors/core/moment.pxd").unlink(), CHANGED),
+        (lambda root: (root / "actors/core/order.py").write_text("changed"), CHANGED),
+        (lambda root: (root / "actors/core/order.pxd").unlink(), CHANGED),
         (
             lambda root: (root / MODULE["MANIFEST"]).write_text('{"python": "cpython-27", "libraries": {}}'),
             f"the core was compiled for cpython-27; {REMEDY}",
