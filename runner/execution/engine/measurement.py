@@ -6,7 +6,6 @@ import math
 from array import array
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 from epicycle.actors import NEVER, Quantity, to_nanoseconds, to_seconds
@@ -19,7 +18,7 @@ from ..results import Outcome
 from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, TimeBatches, TokenBatches, batch_interval, mser
 from .statistic import MOST, Statistic, statistic_of
 
-_HELD = 1024  # whole numbers for which it is known whether a condition holds
+_HELD = 1024  # states for which it is known whether a condition holds
 _EXACT = 2**53  # whole numbers up to here have exact floats
 
 
@@ -54,7 +53,7 @@ class Measurement:
         # The values of most tokens are known at once: floats as they are, whole numbers as floats or not.
         self._is_of_numbers = measure.when is None
         self._is_of_floats = measure.when is None and measure.take not in _AS_THEY_ARE
-        self._holds: dict[int, Any] | None = None if measure.when is None else {}
+        self._holds: dict[int | str, Any] | None = None if measure.when is None else {}  # states recur
         start = 0
         if measure.after == MSER5:
             self._kept = _Kept(metric.ports)
@@ -83,11 +82,10 @@ class Measurement:
             number: float = token
             if self._is_of_numbers and -MOST <= number <= MOST:
                 return token
-        elif type(token) is not int:
-            pass
-        elif self._is_of_floats and -_EXACT <= token <= _EXACT:
-            return float(token)
-        elif self._holds is not None:
+        elif self._is_of_floats:
+            if type(token) is int and -_EXACT <= token <= _EXACT:
+                return float(token)
+        elif self._holds is not None and (type(token) is str or type(token) is int):
             value = self._holds.get(token)
             if value is None:
                 value = _measured(self._measure, token)
@@ -138,7 +136,7 @@ def _measured(measure: MetricSpec, token: Any) -> Any:
     if measure.take in ("first", "last", "count", "rate"):
         return token
     if measure.when is not None:
-        return (_known if isinstance(token, str) else _holds)(measure.when, token)
+        return _holds(measure.when, token)
     if isinstance(token, str):  # float() reads some of them
         return _Unfit(f"{short(token)}, which is not a number,")
     try:
@@ -156,9 +154,6 @@ def _holds(when: Formula, token: Any) -> float | _Unfit:
         return float(bool(when({"value": token})))
     except Exception as error:
         return _Unfit(f"{short(token)}, for which {when.source!r} cannot be evaluated ({error}),")
-
-
-_known = lru_cache(maxsize=1024, typed=True)(_holds)  # states recur
 
 
 # -- tokens, all with the same weight -------------------------------------------------------------------------------
