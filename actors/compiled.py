@@ -39,12 +39,12 @@ LIBRARIES = {
         "epicycle.runner.execution.engine.batches",
         "epicycle.runner.execution.engine.statistic",
         "epicycle.runner.execution.engine.measurement",
-        "epicycle.runner.execution.engine.listeners",
     ),
     "forms": ("epicycle.runner.execution.engine.forms",),
     # Pay where thousands of runs are to come.
     "machines": (
         "epicycle.actors.expression.operations",
+        "epicycle.actors.modes.borders",
         "epicycle.actors.modes.modal",
         "epicycle.actors.modes.machine",
     ),

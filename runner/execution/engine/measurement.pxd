@@ -1,7 +1,10 @@
 # Types for C; measurement.py has the documentation.
 
 cimport cython
+from epicycle.actors cimport Receiver
+from epicycle.runner.execution.engine.agenda cimport Instant
 from epicycle.runner.execution.engine.batches cimport TimeBatches, TokenBatches
+from epicycle.runner.execution.engine.director cimport Director
 from epicycle.runner.execution.engine.statistic cimport MOST, Statistic
 
 
@@ -15,6 +18,14 @@ cdef class Measurement:
     cpdef add(self, str port, long long time, token)
     @cython.locals(number=cython.double)
     cpdef _value(self, token)
+
+
+cdef class Measuring(Receiver):
+    cdef public Measurement measurement
+    cdef public str port
+    cdef public Director director
+    @cython.locals(now=Instant)
+    cpdef put(self, token)
 
 
 cdef class _Taking:

@@ -6,9 +6,9 @@ import math
 from array import array
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import NEVER, Quantity, to_nanoseconds, to_seconds
+from epicycle.actors import NEVER, Quantity, Receiver, to_nanoseconds, to_seconds
 from epicycle.actors.expression import Formula
 
 from ...model.catalogue.metrics import MSER5, TIME, MetricSpec
@@ -17,6 +17,9 @@ from ...support.shown import short
 from ..results import Outcome
 from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, TimeBatches, TokenBatches, batch_interval, mser
 from .statistic import MOST, Statistic, statistic_of
+
+if TYPE_CHECKING:
+    from .director import Director
 
 _HELD = 1024  # states for which it is known whether a condition holds
 _EXACT = 2**53  # whole numbers up to here have exact floats
@@ -125,6 +128,20 @@ class Measurement:
             low, high = (Quantity(each, unit).to(to) for each in (interval.low, interval.high))
             interval = replace(interval, low=low, high=high)
         return replace(found, value=Quantity(found.value, unit).to(to), interval=interval)
+
+
+class Measuring(Receiver):
+    """Passes the tokens of a port to a metric."""
+
+    __slots__ = ("director", "measurement", "port")
+
+    def __init__(self, measurement: Measurement, port: str, director: Director) -> None:
+        self.measurement = measurement
+        self.port = port
+        self.director = director
+
+    def put(self, token: Any) -> None:
+        self.measurement.add(self.port, self.director.now().time, token)
 
 
 _AS_SENT = ("first", "last", "min", "max")  # for which infinity is a value like any other

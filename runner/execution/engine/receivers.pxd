@@ -3,11 +3,19 @@
 cimport cython
 from epicycle.actors cimport Emitter, Receiver
 from epicycle.runner.execution.engine.director cimport Director
-from epicycle.runner.execution.results cimport Writer
+from epicycle.runner.execution.engine.agenda cimport Instant
+from epicycle.runner.execution.results cimport Samples, Writer
 
 
 cdef class Call(Receiver):
     cdef public object function
+    cpdef put(self, token)
+
+
+cdef class Recording(Receiver):
+    cdef public Samples samples
+    cdef public Director director
+    @cython.locals(now=Instant)
     cpdef put(self, token)
 
 

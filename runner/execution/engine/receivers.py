@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from epicycle.actors import OutputPort
     from epicycle.aspects import JoinPoint, JoinPointAspect
 
-    from ..results import Writer
+    from ..results import Samples, Writer
     from .director import Director
 
 Deliver = Callable[[Any], None]
@@ -30,6 +30,20 @@ class Call(Receiver):
 
     def put(self, token: Any) -> None:
         self.function(token)
+
+
+class Recording(Receiver):
+    """Appends tokens to a signal."""
+
+    __slots__ = ("director", "samples")
+
+    def __init__(self, samples: Samples, director: Director) -> None:
+        self.samples = samples
+        self.director = director
+
+    def put(self, token: Any) -> None:
+        now = self.director.now()
+        self.samples.add(now.time, now.microstep, token)
 
 
 class Fork(Receiver):

@@ -23,12 +23,12 @@ from .directors import director_of
 from .errors import ActorError
 from .forms import attach
 from .interventions import Interventions
-from .listeners import Measuring, Recording
 from .loop import handle_events
 from .measured import Measured, add_computed
+from .measurement import Measuring
 from .monitoring import Listening, Monitoring
 from .pace import Pace
-from .receivers import Deliver
+from .receivers import Deliver, Recording
 from .trace import Tracer, Tracing, TracingLog, tracing
 from .wiring import Wiring
 
