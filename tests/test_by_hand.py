@@ -6,7 +6,7 @@ from statistics import mean, variance
 
 import pytest
 
-from benchmarks.written import NAMES, by_hand, model
+from benchmarks.written import NAMES, by_hand, model, of_python
 from epicycle.runner import Simulation
 
 SEEDS = 12
@@ -23,3 +23,10 @@ def test_a_program_by_hand_has_the_metrics_of_its_model(name: str) -> None:
         one, other = [float(run[metric]) for run in runs], [float(run[metric]) for run in theirs]
         error = ((variance(one) + variance(other)) / SEEDS) ** 0.5
         assert abs(mean(one) - mean(other)) <= MOST * error + 1e-9 * abs(mean(one)), metric
+
+
+def test_a_lift_in_python_does_what_the_machine_does() -> None:
+    one, other = (Simulation(made, seed=3).run(until=1800.0) for made in (model("lift_group"), of_python()))
+    assert one.metrics == other.metrics
+    for port in ("stay.output", "lift[0].load", "lift[1].height"):
+        assert list(one.signals[port].values) == list(other.signals[port].values)
