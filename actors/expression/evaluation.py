@@ -294,7 +294,7 @@ class _Evaluation:
         return result
 
     def _compare(self, node: ast.Compare) -> bool:
-        left = self._weighed(node.left, self.value(node.left))
+        left = self.value(node.left)
         for sign, right_node in zip(node.ops, node.comparators, strict=True):
             right = self._weighed(right_node, self.value(right_node))
             if not self.guard(node, COMPARE[type(sign)], left, right):

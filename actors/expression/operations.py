@@ -33,7 +33,6 @@ UNDECIDED: Final = (ArithmeticError, BudgetError, LookupError, TypeError, UnitEr
 NUMBERS: Final = frozenset({float, int})
 LIGHT: Final = frozenset({float, int, bool, type(None)})  # which cost nothing
 _PLAIN: Final = frozenset({float, int, bool, type(None), str, list, dict})
-_TEXT: Final = frozenset({str})
 _OF_SLICES: Final = frozenset({int, type(None)})
 _OTHERS: Final = (int, float, str, list, tuple, Mapping, np.generic, np.ndarray, type)
 _DEEP: Final = MAX_DEPTH - 10
@@ -73,9 +72,9 @@ def _copied(value: Any, left: Left, depth: int) -> Any:
     made: Any
     items: Any
     if type(value) is dict:
-        made, items = value.copy(), value.items()
-        if not _TEXT.issuperset(map(type, value)):
+        if not _has_texts(value):
             return None
+        made, items = value.copy(), value.items()
     elif type(value) is list:
         made, items = value.copy(), enumerate(value)
     else:
@@ -157,23 +156,31 @@ def _size(value: Any, depth: int) -> int:
     """The elements of a list or dict of plain things at all levels; negative if it holds anything else."""
     size = len(value)
     if type(value) is dict:
-        if not _TEXT.issuperset(map(type, value)):
+        if not _has_texts(value):
             return -1
         value = value.values()
-    if LIGHT.issuperset(map(type, value)):
+    elif LIGHT.issuperset(map(type, value)):
         return size
     for item in value:
         kind = type(item)
-        if kind is dict and _TEXT.issuperset(map(type, item)) and LIGHT.issuperset(map(type, item.values())):
-            size += len(item)  # as an entity mostly is
-        elif kind is str:
+        if kind is str:
             size += len(item) // 10
-        elif kind not in LIGHT:
-            inner = _size(item, depth + 1) if (kind is list or kind is dict) and depth < _DEEP else -1
+        elif kind is list or kind is dict:
+            inner = _size(item, depth + 1) if depth < _DEEP else -1
             if inner < 0:
                 return -1
             size += inner
+        elif kind not in LIGHT:
+            return -1
     return size
+
+
+def _has_texts(value: dict[Any, Any]) -> bool:
+    """Whether all keys are texts."""
+    for key in value:  # noqa: SIM110  a generator takes longer
+        if type(key) is not str:
+            return False
+    return True
 
 
 @cache
@@ -240,10 +247,24 @@ def _comparing(function: Callable[[Any, Any], bool]) -> Callable[[Any, Any, Left
     return lambda first, second, left: function(weighed(first, left), weighed(second, left))
 
 
+def _finding(is_wanted: bool) -> Callable[[Any, Any, Left], bool]:
+    """Whether something is in a list, or is not, which takes the shortest way."""
+    find = _comparing(COMPARE[ast.In])
+
+    def found(first: Any, second: Any, left: Left) -> bool:
+        if type(second) is list and not second:
+            return not is_wanted
+        return find(first, second, left) is is_wanted
+
+    return found
+
+
 # By the names of their nodes in the tree.
 OPERATORS: Final[dict[type[ast.AST], Callable[..., Any]]] = {
     **{kind: _of_one(function) for kind, function in UNARY.items()},
     **{kind: _of_two(function) for kind, function in BINARY.items()},
     **{kind: _comparing(function) for kind, function in COMPARE.items()},
     ast.Add: _joining(_of_two(BINARY[ast.Add])),
+    ast.In: _finding(True),
+    ast.NotIn: _finding(False),
 }
