@@ -12,19 +12,15 @@ import textwrap
 import tomllib
 import venv
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from epicycle.actors.compiled import LIBRARIES
 from epicycle.runner.model.catalogue.metrics import TAKES
-from tests.plugins import ABSENT, PLUGINS
+from tests.plugins import ABSENT
+from tests.shipped import CODE_FOLDERS, FOLDERS, ROOT, place_of, shipped_files
 
-ROOT = Path(__file__).parents[1]
-THERE = tuple(name for name in PLUGINS if name not in ABSENT)
-FOLDERS = ("actors", "aspects", "models", "runner", "bridges", *THERE, "api")  # the last is `epicycle` itself
-CODE_FOLDERS = ("actors", "aspects", "runner", "api", "bridges", *PLUGINS)
 # What is declared, without the plug-ins whose folders are missing.
 DECLARED = "".join(
     line
@@ -34,57 +30,6 @@ DECLARED = "".join(
 CONFIG = tomllib.loads(DECLARED)
 PACKAGES = CONFIG["tool"]["setuptools"]["packages"]
 TYPINGS = ROOT / "tests" / "typings"
-
-
-def shipped_files() -> list[Path]:
-    """Return every file that belongs in the wheel, relative to the root."""
-    return sorted(
-        path.relative_to(ROOT)
-        for folder in FOLDERS
-        for path in (ROOT / folder).rglob("*")
-        if (
-            path.suffix in {".py", ".pyi", ".yaml", ".css", ".js", ".mplstyle", ".pxd", ".pyx", ".template", ".LICENSE"}
-            or path.name in {"py.typed", "schema.json"}
-        )
-        and "__pycache__" not in path.parts
-    )
-
-
-def place_of(file: Path) -> Path:
-    """Return where in the package epicycle a file of ours is."""
-    return file.relative_to("api") if file.parts[0] == "api" else file
-
-
-def module_name(file: Path) -> str:
-    """Return the dotted name under which a file of ours is imported."""
-    parts = place_of(file).with_suffix("").parts
-    return ".".join(("epicycle", *(parts[:-1] if file.name == "__init__.py" else parts)))
-
-
-def imported_names(text: str, file: Path) -> Iterator[tuple[int, str]]:
-    """Yield the line and the absolute dotted name of everything that a module imports."""
-    package = ["epicycle", *file.parent.parts]
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield node.lineno, alias.name
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else []
-            base = [*base, *(node.module.split(".") if node.module else [])]
-            for alias in node.names:
-                yield node.lineno, ".".join([*base, alias.name])
-
-
-def forbidden_imports(text: str, file: Path) -> list[str]:
-    """Return a line for each import in a module that goes the wrong way or past the name epicycle."""
-    above = CODE_FOLDERS[CODE_FOLDERS.index(file.parts[0]) + 1 :]
-    found = []
-    for line, name in imported_names(text, file):
-        first, _, rest = name.partition(".")
-        folder = rest.partition(".")[0] if first == "epicycle" else ""
-        if folder in above or first in FOLDERS:
-            found.append(f"{file.as_posix()}:{line} imports {name}")
-    return found
 
 
 MODELS = sorted(file.as_posix() for file in shipped_files() if file.suffix == ".yaml" and file.parts[0] == "models")
@@ -152,87 +97,6 @@ def test_mypy_redirects_equal_the_tree() -> None:
     found = {stub.relative_to(TYPINGS).as_posix(): stub.read_text("utf-8") for stub in stubs}
     found = {name: text for name, text in found.items() if not name.startswith(tuple(f"epicycle/{n}/" for n in ABSENT))}
     assert found == expected
-
-
-@pytest.mark.slow
-def test_imports_go_one_way() -> None:
-    found = [
-        problem
-        for file in shipped_files()
-        if file.suffix == ".py" and file.parts[0] in CODE_FOLDERS
-        for problem in forbidden_imports((ROOT / file).read_text("utf-8"), file)
-    ]
-    assert found == []
-
-
-@pytest.mark.parametrize(
-    ("file", "line", "name"),
-    [
-        ("actors/flow.py", "import epicycle.aspects", "epicycle.aspects"),
-        ("actors/flow.py", "from epicycle import runner", "epicycle.runner"),
-        ("actors/flow.py", "from epicycle.aspects import Aspect", "epicycle.aspects.Aspect"),
-        ("actors/flow.py", "from .. import aspects", "epicycle.aspects"),
-        ("actors/__init__.py", "from ..runner import run", "epicycle.runner.run"),
-        ("actors/core/ports.py", "from ...aspects.core import Aspect", "epicycle.aspects.core.Aspect"),
-        (
-            "aspects/core/port.py",
-            "from epicycle.runner.execution.engine import Director",
-            "epicycle.runner.execution.engine.Director",
-        ),
-        ("runner/interface/cli.py", "import actors", "actors"),
-        ("runner/interface/cli.py", "from models import robots", "models.robots"),
-    ],
-)
-def test_an_import_the_wrong_way_is_found(file: str, line: str, name: str) -> None:
-    assert forbidden_imports(f"if True:\n    {line}\n", Path(file)) == [f"{file}:2 imports {name}"]
-
-
-@pytest.mark.parametrize(
-    ("file", "line"),
-    [
-        ("actors/core/ports.py", "from ..core import Tag"),
-        ("actors/core/ports.py", "from . import Tag"),
-        ("aspects/core/port.py", "from epicycle.actors import Actor"),
-        ("runner/interface/cli.py", "from .model import actors"),
-        ("runner/model/build/load.py", "from epicycle.aspects import Aspect"),
-    ],
-)
-def test_an_import_the_right_way_is_not(file: str, line: str) -> None:
-    assert forbidden_imports(line, Path(file)) == []
-
-
-@pytest.mark.slow
-def test_nothing_is_imported_twice() -> None:
-    """Look in a fresh interpreter started at the root, where a bare `import actors` would work too."""
-    script = f"""
-        import importlib, json, pkgutil, sys
-        for folder in {[f"epicycle.{name}" for name in FOLDERS[:-1]]!r}:
-            package = importlib.import_module(folder)
-            for module in pkgutil.walk_packages(package.__path__, folder + "."):
-                if not module.name.endswith("__main__"):
-                    importlib.import_module(module.name)
-        print(json.dumps({{n: getattr(m, "__file__", None) for n, m in sys.modules.items()}}))
-    """
-    done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(script)],
-        cwd=ROOT,
-        env={**os.environ, "EPICYCLE_CORE": "python"},  # compiled modules are files of another name
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    names: dict[str, list[str]] = {}
-    for name, file in json.loads(done.stdout.splitlines()[-1]).items():
-        path = Path(file).resolve() if file else None
-        if path and path.is_relative_to(ROOT) and path.relative_to(ROOT).parts[0] in FOLDERS:
-            names.setdefault(path.relative_to(ROOT).as_posix(), []).append(name)
-    expected = {
-        file.as_posix(): [module_name(file)]
-        for file in shipped_files()
-        if file.suffix == ".py" and file.stem != "__main__"
-    }
-    assert names == expected
 
 
 def test_models_are_found_here_too(busy_folder: Path) -> None:

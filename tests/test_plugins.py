@@ -105,5 +105,12 @@ def test_epicycle_without_plugins(tmp_path: Path) -> None:
 def test_tests_pass_without_plugins() -> None:
     """Those that plug-ins could matter to; ``python -m tests.plugins`` runs all."""
     parts = ("catalogue", "commands", "conformance", "language", "engine/test_directors.py", "fuzz/test_hostile.py")
-    parts += ("test_packaging.py", "test_reference.py", "test_docs.py", "test_plugins.py", "actors/test_variables.py")
+    parts += (
+        "test_imports.py",
+        "test_packaging.py",
+        "test_reference.py",
+        "test_docs.py",
+        "test_plugins.py",
+        "actors/test_variables.py",
+    )
     assert main(["-m", "not slow", *(f"tests/{part}" for part in parts)]) == 0

@@ -11,8 +11,13 @@ from simpy.events import Event
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process
 from epicycle.runner.execution.engine import Results, Simulation
+from epicycle.runner.execution.engine.measurement import Measurement, Outcome
 from epicycle.runner.model.build.load import load_model
 from epicycle.runner.model.build.model import Model
+from epicycle.runner.model.catalogue.metrics import MetricSpec
+from epicycle.runner.model.graph.outputs import Metric
+
+SECOND = 10**9  # ns
 
 
 class Repeat(Actor):
@@ -195,3 +200,11 @@ def seen(simulation: Simulation, path: str = "probe") -> list[tuple[float, int, 
     probe = simulation[path]
     assert isinstance(probe, Probe)
     return probe.seen
+
+
+def measured(tokens: list[tuple[str, int, Any]], end: int, ports: tuple[str, ...] = ("a.out",), **said: Any) -> Outcome:
+    """The value of a metric over tokens of ports at times in ns."""
+    measurement = Measurement(Metric("m", list(ports), MetricSpec(**said)))
+    for port, time, token in tokens:
+        measurement.add(port, time, token)
+    return measurement.outcome(end)

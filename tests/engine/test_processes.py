@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 import simpy
 
-from epicycle.runner.execution.engine import ActorError, Results, Simulation
-from tests.engine.engine_parts import Plan, Script, load, seen, sends, simulate
+from epicycle.runner.execution.engine import ActorError, Results
+from tests.engine.engine_parts import Script, seen, sends, simulate
 
 Behaviour = Callable[[Script], Generator[Any, Any, None]]
 ALONE = "actors: {a: {type: Script}, probe: {type: Probe}}\nconnections: [a.output -> probe.input]\n"
@@ -314,83 +314,6 @@ def test_stop_when_from_a_process_finishes_the_tag(behave: Callable[..., Results
     simulation, results = simulate(ALONE + "run: {stop_when: a.output}\n")
     assert (results.stopped, results.end) == ("stop_when", 1.0)
     assert seen(simulation) == [(1.0, 1, (1,))]
-
-
-class FussyError(Exception):
-    """SimPy cannot make a copy of this one."""
-
-    def __init__(self, one: int, two: int) -> None:
-        super().__init__(f"{one} and {two}")
-
-
-@pytest.mark.parametrize(
-    ("resumed_by", "error"),
-    [(by, ValueError("bad luck")) for by in ("start", "wait", "read", "timeout", "subprocess")]
-    # SimPy itself fails to hand such an error from one of its processes to another.
-    + [(by, FussyError(1, 2)) for by in ("start", "wait", "read", "timeout")],
-)
-def test_an_exception_in_a_process_names_its_actor(
-    resumed_by: str, error: Exception, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def inner(self: Script) -> Generator[Any, Any, None]:
-        yield self.environment.timeout(1)
-        raise error
-
-    def behaviour(self: Script) -> Generator[Any, Any, None]:
-        if resumed_by == "wait":
-            yield self.wait(1)
-        elif resumed_by == "read":
-            yield self.read(self.input)
-        elif resumed_by == "timeout":
-            yield self.environment.timeout(1)
-        elif resumed_by == "subprocess":
-            yield self.environment.process(inner(self))
-        raise error
-
-    monkeypatch.setattr(Script, "behaviour", staticmethod(behaviour))
-    model = load(
-        "actors:\n  t: {type: Ticker}\n  a: {type: Script}\n  probe: {type: Probe}\n"
-        "connections: [t.output -> a.input]\n"
-    )
-    simulation = Simulation(model)
-    with pytest.raises(ActorError) as caught:
-        simulation.run(until=3)
-    tag = {"start": "(0 s, 1)", "read": "(0 s, 1)", "subprocess": "(1 s, 1)"}.get(resumed_by, "(1 s, 1)")
-    reason = "ValueError: bad luck" if isinstance(error, ValueError) else "FussyError: 1 and 2"
-    first = str(caught.value).splitlines()[0]
-    assert first == f"a failed in run() at {tag}: {reason}"
-    assert caught.value.where.endswith("m.yaml:4:3")
-    assert simulation["probe"].wrapped == 1  # type: ignore[attr-defined]
-
-
-def test_an_exception_in_a_process_of_simpys_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    def begin(actor: Plan) -> None:
-        def stray() -> Generator[Any, Any, None]:
-            yield actor.context.environment.timeout(5)
-            raise KeyError("lost")
-
-        actor.context.environment.process(stray())
-
-    monkeypatch.setattr(Plan, "begin", begin)
-    with pytest.raises(ActorError) as caught:
-        simulate("actors: {a: {type: Plan}}")
-    message, at, line, carets = str(caught.value).splitlines()
-    assert message == "a SimPy process failed in its generator at (5 s, 1): KeyError: 'lost'"
-    assert at.startswith("   raised at ")
-    assert line[carets.index("^") :] == 'raise KeyError("lost")'
-
-
-def test_an_exception_in_a_callback_of_simpys(monkeypatch: pytest.MonkeyPatch) -> None:
-    """SimPy hands it on as it is, where that of a generator is a copy with a cause."""
-
-    def begin(actor: Plan) -> None:
-        actor.context.environment.timeout(5).callbacks.append(lambda event: {}["lost"])
-
-    monkeypatch.setattr(Plan, "begin", begin)
-    with pytest.raises(ActorError) as caught:
-        simulate("actors: {a: {type: Plan}}")
-    told = str(caught.value).splitlines()[0]
-    assert told == "a SimPy process failed in its generator at (5 s, 1): KeyError: 'lost'"
 
 
 def test_a_process_is_halted_in_the_step_in_which_what_it_waits_for_happens(behave: Callable[..., Results]) -> None:

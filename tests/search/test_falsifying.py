@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
-import re
 import shlex
 import signal
 import subprocess
-import tempfile
 import time
-from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -21,29 +17,9 @@ from epicycle.actors import EpicycleError
 from epicycle.runner.interface.cli import main
 from epicycle.runner.search import proposals as proposing
 from epicycle.runner.search import space
-from tests import cases
-from tests.cases import Case
+from tests.search.far import TEXT, falsify
 from tests.study.study_parts import MODEL, THIS, command
 
-# How far a point is from one that nobody knows; and a source of noise, so that no two runs are the same.
-TEXT = """
-model: far
-parameters: {x: 0.0, y: {value: 0, unit: m}, n: 3, policy: fifo, noise: 0.0}
-actors:
-  clock: {type: Clock, period: 1 s}
-  noise: {type: Random, distribution: {type: Uniform, low: 0, high: "${noise}"}}
-  far:
-    type: Expression
-    expression: (${x} - 0.71)**2 + (${y} - 0.13)**2 + ${n} + (1 if '${policy}' == 'fifo' else 0) + noise
-  sink: {type: Recorder}
-connections:
-  - clock.output -> noise.trigger
-  - noise.output -> far.noise
-  - far.output -> sink.input
-run: {stop: 3 s}
-monitors:
-  away: always far.output > 0.0001
-"""
 BOX = ["x=0.0..1.0", "y=0 m..1 m"]
 ALONE = ["n=0", "policy=lifo"]
 
@@ -52,10 +28,6 @@ ALONE = ["n=0", "policy=lifo"]
 def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "far.yaml").write_text(TEXT, encoding="utf-8")
-
-
-def falsify(*arguments: object) -> int:
-    return main(["search", "far.yaml", "--break", "away", "--jobs", "1", *map(str, arguments)])
 
 
 def made_again(run: str) -> str:
@@ -408,49 +380,3 @@ def test_an_interrupt_keeps_what_is_there() -> None:
     assert process.returncode == 130
     assert told == "interrupted; finished runs are kept: the same command continues\n"
     assert 0 < len(epicycle.open_study("out").table()) < 20
-
-
-# -- what is wrong ----------------------------------------------------------------------------------------------------
-
-BAD = Path(__file__).parent / "bad_searches.txt"
-CASES = cases.read(BAD)
-LISTS = re.compile(r"(packaged \w+: )[^;\n]*")  # which grow with the house
-
-
-def message(case: Case) -> str:
-    """What is said about the options of a case."""
-    options = {"--break": "away", "--runs": "1", "--out": "out"}
-    words = [word for option in [*options.items(), *case.options] for word in option]
-    said = StringIO()
-    with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said), contextlib.suppress(SystemExit):
-        main(["search", "far.yaml", *words])
-    return LISTS.sub(r"\1...", said.getvalue().rpartition("MODEL or STUDY\n")[2])
-
-
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_what_is_wrong_is_told(case: Case) -> None:
-    assert message(case) == case.message
-    assert not Path("out").exists()
-
-
-def test_a_folder_of_something_else_is_left_alone(capsys: pytest.CaptureFixture[str]) -> None:
-    falsify("--runs", 1, "--out", "out")
-    capsys.readouterr()
-    assert falsify("--runs", 1, "--vary", "x=0.0..1.0", "--out", "out") == 2
-    assert capsys.readouterr().err == (
-        "error: out was made when falsify_far had different factors: none, not x (float)\n"
-        "   help: choose another folder with --out\n"
-    )
-    assert main(["search", "nosuch", "--break", "away"]) == 2
-    assert capsys.readouterr().err.startswith("error: there is no packaged model 'nosuch'\n   help: packaged models: ")
-
-
-def write_anew() -> None:
-    """Put the present messages into the file; read the difference before keeping it."""
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-        Path("far.yaml").write_text(TEXT, encoding="utf-8")
-        cases.write(BAD, message)
-
-
-if __name__ == "__main__":
-    write_anew()

@@ -1,4 +1,5 @@
-"""The paper's scenario as a plain loop over actors, for tests that need real problems but no engine."""
+"""The paper's scenario as a plain loop over actors, and a single controller whose problems are recorded, for tests that
+need real problems but no engine."""
 
 from __future__ import annotations
 
@@ -8,8 +9,11 @@ import numpy as np
 
 from epicycle.actors import (
     Barrier,
+    BodyState,
     CircularMotion,
+    Estimate,
     Inform,
+    Plan,
     Problem,
     ReachGoal,
     RobustController,
@@ -41,6 +45,25 @@ class _Recorder(Barrier):
         self.problems.append(problem)
         self.records.append((numbers_of(problem), starts.copy(), solution))
         return solution
+
+
+def state(x: float = 30.0, y: float = 0.0, vx: float = 0.0, vy: float = 0.0, *, time: float = 0.0) -> BodyState:
+    return BodyState(np.array([x, y]), np.array([vx, vy]), time)
+
+
+def estimate(x: float = 12.0, y: float = 2.0, spread: float = 0.1, *, time: float = 0.0) -> Estimate:
+    return Estimate(np.array([x, y, -1.0, 0.0]), spread * np.eye(4), time, ("main",))
+
+
+def plan(robot: str, time: float, x: float = 20.0, y: float = 2.0, controls: object = None) -> Plan:
+    return Plan(robot, time, state(x, y, time=time), np.zeros((11, 2)) if controls is None else np.array(controls))
+
+
+def make(**parameters: object) -> tuple[Harness, _Recorder]:
+    """A controller whose problems are recorded; steps are counted from now, so that row s - 1 is step s."""
+    recorder = _Recorder()
+    parameters = {"horizon_from": "now", **parameters}
+    return Harness(RobustController("main.controller", solver=recorder, **parameters)), recorder
 
 
 def play(

@@ -1,4 +1,4 @@
-"""Pages of runs, opened from their files in a browser that is offline."""
+"""Pages of runs, opened from their files in a browser that is offline; and runs for files of other viewers."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from epicycle.runner.model.build.figures import figures_of
 from epicycle.runner.model.text.problems import Problems
 from epicycle.runner.show.view.pages import Page
 from epicycle.runner.show.view.recording import Recording
+
+from .exported import VARIED, Varied, recorded
 
 
 class Opened:
@@ -80,3 +82,15 @@ def written(
         recordings.append(Recording(loaded, figures_of(loaded, Problems()), is_compared=len(runs) > 1))
         recordings[-1].run(until=until)
     return Page(recordings, names).save(path)
+
+
+@pytest.fixture(scope="session")
+def wifi() -> Recording:
+    return recorded(load_model("collision_avoidance", disturb=["wifi_burst"]))
+
+
+@pytest.fixture
+def varied(tmp_path: Path) -> Recording:
+    path = tmp_path / "varied.yaml"
+    path.write_text(VARIED, encoding="utf-8")
+    return recorded(load_model(path, types=[Varied]))
