@@ -4,11 +4,12 @@ from . import elementary, paths
 from .actor import Actor, Context, declared_ports, has_own_ports
 from .authoring import ABSENT, Latest, Pending, Queues, Tally, present, rounds
 from .environment import Environment, Events, Host
-from .errors import EpicycleError, Fault, FaultError, Span
+from .errors import EpicycleError, Fault, FaultError, ParameterError, Span
 from .files import FOLDERS, check_allowed, irregular, open_regular, read_regular, read_table
 from .laws import normal_quantile
 from .messages import (
     abridged,
+    bounds_text,
     brief,
     counted,
     cut,
@@ -22,18 +23,7 @@ from .messages import (
     visible_lines,
 )
 from .order import NEVER, ReadyQueue, TimedQueue
-from .parameter import (
-    REQUIRED,
-    Configurable,
-    Parameter,
-    ParameterError,
-    bounds_text,
-    declared_parameters,
-    found_variants,
-    part_finders,
-    unknown_parameter,
-    variants,
-)
+from .parameter import REQUIRED, Configurable, Parameter, declared_parameters, unknown_parameter
 from .parameter_kinds import MappingParameter, any_parameter, array_parameter, texts_parameter
 from .port_parameter import PortParameter
 from .port_types import accepts, shaped, token_type, type_name
@@ -54,6 +44,7 @@ from .tag import (
     to_seconds,
 )
 from .units import UnitError, convert, in_si, parse_unit, units_like
+from .variants import found_variants, part_finders, variants
 
 __all__ = [
     "ABSENT", "FOLDERS", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NO_TOKENS", "REQUIRED", "Actor",

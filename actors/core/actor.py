@@ -34,7 +34,8 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Protocol, Self, cast
 from weakref import WeakKeyDictionary
 
-from .parameter import Configurable, ParameterError
+from .errors import ParameterError
+from .parameter import Configurable
 from .port_parameter import ParameterPort, PortParameter
 from .ports import InputPort, OutputPort, PortError
 from .random import Stream, Streams

@@ -86,3 +86,7 @@ class FaultError(EpicycleError):
     def within(self, *keys: str | int, prefix: str = "") -> list[Fault]:
         """The faults of something that contains the value under these keys."""
         return [fault.within(*keys, prefix=prefix) for fault in self.faults]
+
+
+class ParameterError(FaultError):
+    """A value that a parameter does not accept; the message says what it accepts."""

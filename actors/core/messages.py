@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import heapq
 import itertools
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -126,3 +126,10 @@ def did_you_mean(name: str, candidates: Iterable[str]) -> str:
     """ ", did you mean 'x'?" for the nearest candidate x, or nothing; for the end of a message."""
     found = nearest(name, candidates)
     return "" if found is None else f", did you mean {found!r}?"
+
+
+def bounds_text(least: float | None, above: float | None, most: float | None, written: Callable[[float], str]) -> str:
+    """The bounds of a number as they are written after it: `` >= 0``, `` > 0 and <= 1``."""
+    ends = ((">=", least), (">", above), ("<=", most))
+    told = " and ".join(f"{sign} {written(end)}" for sign, end in ends if end is not None)
+    return f" {told}" if told else ""

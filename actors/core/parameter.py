@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from keyword import iskeyword
 from pathlib import Path
@@ -14,10 +14,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import Fault, FaultError
-from .messages import brief, did_you_mean, digits, nearest
+from .errors import Fault, ParameterError
+from .messages import bounds_text, brief, did_you_mean, digits, nearest
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep
 from .units import UnitError, convert, in_si, quantity
+from .variants import variant_of, variants
 
 T = TypeVar("T")
 V = TypeVar("V")
@@ -39,10 +40,6 @@ if TYPE_CHECKING:
         """The same, and the shape of a list."""
 
         shape: tuple[int | None, ...] | None
-
-
-class ParameterError(FaultError):
-    """A value that a parameter does not accept; the message says what it accepts."""
 
 
 class _Required:
@@ -279,7 +276,7 @@ class Parameter(Generic[T]):
     def _in_right_unit(self, value: object, error: UnitError) -> str:
         """A text with its unit as it is spelled right, or else with the parameter's; empty if it has no number."""
         found = quantity(value) if isinstance(value, str) else None
-        if found is None or not found[1]:
+        if found is None:
             return ""
         number = str(value).removesuffix(found[1]).strip()
         return f"{number} {error.faults[0].meant or self.unit}" if self.unit not in ("", "1") else ""
@@ -426,29 +423,6 @@ def unknown_parameter(cls: type, name: str) -> str:
     return f"{cls.__name__} has no parameter {name!r}{did_you_mean(name, declared_parameters(cls))}"
 
 
-def variants(base: type) -> dict[str, type]:
-    """The concrete classes below ``base`` by name; a class whose name starts with '_' stays hidden."""
-    found: dict[str, type] = {}
-    child: type
-    for child in base.__subclasses__():
-        if not child.__name__.startswith("_"):
-            found[child.__name__] = child
-        found.update(variants(child))
-    return found
-
-
-# Called with a name that is no variant's: each may import a class of that name.
-part_finders: list[Callable[[str], None]] = []
-
-
-def found_variants(base: type, name: object) -> dict[str, type]:
-    """The variants of ``base``, after a search for one of that name."""
-    if isinstance(name, str) and name not in variants(base):
-        for find in part_finders:
-            find(name)
-    return variants(base)
-
-
 def build_variant(base: type, value: object, unit: str = "") -> object:
     """Make one of the variants of ``base`` from a mapping with a ``type`` key; an instance is returned as it is.
 
@@ -456,33 +430,16 @@ def build_variant(base: type, value: object, unit: str = "") -> object:
     """
     if isinstance(value, base):
         return value
-    name = value.get("type") if isinstance(value, Mapping) else None
-    known = found_variants(base, name)
-    valid = ", ".join(sorted(known))
-    if not isinstance(value, Mapping):
-        raise ParameterError(f"{brief(value)} is not a mapping {{type: ...}} with one of the types {valid}")
-    if "type" not in value:
-        raise ParameterError(f"{brief(value)} has no 'type'; expected one of {valid}")
-    if not isinstance(name, str) or name not in known:
-        message = f"{brief(name)} is not one of {valid}{did_you_mean(str(name), known)}"
-        raise ParameterError(message, ("type",), kind="type", meant=nearest(str(name), known) or "")
-    values = {key: item for key, item in value.items() if key != "type"}
-    declared = declared_parameters(known[name])
+    cls, values = variant_of(base, value)
+    declared = declared_parameters(cls)
     for key in [key for key in values if unit and key in declared]:
         try:
             values[key] = declared[key].in_unit(unit).convert(values[key])
         except ParameterError as error:
-            raise ParameterError.several(_within(known[name], key, error)) from None
-    return known[name](**values)
+            raise ParameterError.several(_within(cls, key, error)) from None
+    return cls(**values)
 
 
 def _within(cls: type, name: str, error: ParameterError) -> list[Fault]:
     """The faults of a parameter of something that is itself a value."""
     return error.within(name, prefix=f"{cls.__name__}.{name}: ")
-
-
-def bounds_text(least: float | None, above: float | None, most: float | None, written: Callable[[float], str]) -> str:
-    """The bounds of a number as they are written after it: `` >= 0``, `` > 0 and <= 1``."""
-    ends = ((">=", least), (">", above), ("<=", most))
-    told = " and ".join(f"{sign} {written(end)}" for sign, end in ends if end is not None)
-    return f" {told}" if told else ""

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Unpack, cast, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import Fault
-from .parameter import REQUIRED, Parameter, ParameterError
+from .errors import Fault, ParameterError
+from .parameter import REQUIRED, Parameter
 
 if TYPE_CHECKING:
     from .parameter import Bounds, Options

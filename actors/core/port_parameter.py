@@ -5,7 +5,8 @@ from __future__ import annotations
 from types import UnionType
 from typing import TYPE_CHECKING, Any, TypeVar, Unpack, overload
 
-from .parameter import REQUIRED, Parameter, ParameterError
+from .errors import ParameterError
+from .parameter import REQUIRED, Parameter
 from .ports import InputPort
 
 if TYPE_CHECKING:
