@@ -283,7 +283,7 @@ class Run:
             seed=self.seed,
             parameters=dict(self.model.parameters),
             metrics={name: each.value for name, each in outcomes.items()},
-            aspects=self._figures(),
+            aspects=self._figures(end),
             signals=self.signals,
             log=self.log,
             end=to_seconds(self.director.last.time),
@@ -324,21 +324,21 @@ class Run:
         where = f"{position.file}:{position.line}:{position.column}" if position else ""
         return ActorError(error.path, error.tag, error.doing, error.reason, where, raised_at(_cause(error)))
 
-    def _figures(self) -> dict[str, dict[str, float | None]]:
-        """How often each event of each aspect happened, over all its ports, and what the aspect reports."""
+    def _figures(self, end: int) -> dict[str, dict[str, float | None]]:
+        """How often each event of each aspect happened, over all its ports, and what the aspect reports at the end."""
         figures: dict[str, dict[str, float | None]] = {}
         for woven in self.aspects:
             total = dict.fromkeys(woven.aspect.events, 0)
             for point in self._ways.points[woven.name]:
                 for event, number in point.counts.items():
                     total[event] = total.get(event, 0) + number
-            figures[woven.name] = {**total, **self._report(woven)}
+            figures[woven.name] = {**total, **self._report(woven, end)}
         return figures
 
-    def _report(self, woven: WovenAspect) -> dict[str, float | None]:
+    def _report(self, woven: WovenAspect, end: int) -> dict[str, float | None]:
         """The report of an aspect; if it fails, the error is raised once all results are complete."""
         try:
-            return dict(woven.aspect.report(self._ways.shared(woven), self.director.last.time))
+            return dict(woven.aspect.report(self._ways.shared(woven), end))
         except Exception as error:
             self._unreported = ActorError(f"aspect {woven.name}", self.director.tag, "report()", describe(error))
             self._unreported.__cause__ = error

@@ -318,16 +318,18 @@ def test_two_processors_in_python() -> None:
 
 
 def test_figures_of_a_processor_to_the_nanosecond() -> None:
-    _, results = simulate(
+    text = (
         "actors: {t: {type: Ticker, period: 10 ms}, a: {type: Scale}, b: {type: Scale}}\n"
         "connections: ['t.output -> a.input, b.input']\n"
-        "aspects: {cpu: {type: Processor, time: 2 ms, at: [a, b]}}",
-        until=0.02,
+        "aspects: {cpu: {type: Processor, time: 2 ms, at: [a, b]}}"
     )
+    _, results = simulate(text, until=0.02)
     figures = results.aspects["cpu"]
     assert figures["mean_response"] == 0.003  # 2 ms and 4 ms; those of 20 ms are not over
     assert figures["max_response"] == 0.004
     assert figures["utilisation"] == 0.4
+    _, results = simulate(text, until=0.015)  # at rest since 14 ms
+    assert results.aspects["cpu"]["utilisation"] == 8 / 15
 
 
 def test_what_is_put_back_before_it_has_begun_is_not_preempted() -> None:
