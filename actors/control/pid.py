@@ -18,7 +18,7 @@ from ..core import (
 from ..core.elementary import exp, expm1
 from ..readings import finite_number
 
-# Other names of the gains.
+# Other names of the gains and limits.
 _REFUSED = {
     symbol: f"PID has no parameter {symbol!r}: {where}"
     for symbols, where in {
@@ -27,6 +27,7 @@ _REFUSED = {
         ("kd", "Kd", "d", "D"): "the gain of the derivative part is 'derivative'",
         ("ti", "Ti"): "give 'integral', which is proportional / Ti",
         ("td", "Td"): "give 'derivative', which is proportional * Td",
+        ("limits", "output_limits", "saturation"): "the limits of the output are 'low' and 'high'",
     }.items()
     for symbol in symbols
 }

@@ -216,7 +216,9 @@ def _made(kind: type[Any], said: object, what: str) -> Any:
     try:
         return kind(**said)
     except ParameterError as error:
-        raise ParameterError.several(error.within(prefix=f"{what}: ")) from None
+        of_class = f"{kind.__name__}."  # which nobody has written
+        faults = (replace(fault, message=fault.message.removeprefix(of_class)) for fault in error.faults)
+        raise ParameterError.several(fault.within(prefix=f"{what}: ") for fault in faults) from None
 
 
 def read_transition(text: str) -> Transition:

@@ -130,6 +130,16 @@ def test_parts_are_described_with_the_actor(capsys: pytest.CaptureFixture[str]) 
     }
 
 
+@pytest.mark.parametrize(("name", "kind"), [("TimeSeries", "figure"), ("Means", "figure of studies")])
+def test_figures_are_described_too(name: str, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert printed(capsys, "describe", name).splitlines()[0] == f"{name}  {kind}, figures"
+    found = json.loads(printed(capsys, "describe", name, "--json"))
+    assert (found["name"], found["kind"], found["group"], found["ports"]) == (name, kind, "figures", [])
+    assert main(["describe", name[:-1]]) == 2
+    near = f"error: there is no type or packaged model {name[:-1]!r}, did you mean {name!r}?"
+    assert capsys.readouterr().err.splitlines()[0] == near
+
+
 def test_aspects_of_a_model_in_order(capsys: pytest.CaptureFixture[str]) -> None:
     options = (
         "--set",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,8 @@ from .listing import LIKE, known_types
 from .options import BAD_INPUT, DONE, FAILED, JSON, command, load, of_call, option, own_types, taken
 
 if TYPE_CHECKING:
+    from epicycle.actors import Configurable
+
     from ...model.build.model import Model
     from ...study.plan.plan import Plan
 
@@ -154,8 +156,8 @@ def describe(options: argparse.Namespace) -> int:
     and monitors, recorded ports, figures and aspects, and the packaged disturbances that fit it; or, with --aspects,
     the aspects at its ports, in the order in which a token meets them.
 
-    Describe a type of actors, aspects or their parts: its ports and parameters; or a file from elsewhere, such as the
-    variables of an FMU (*.fmu), or the topics of a recording of ROS 2.
+    Describe a type of actors, aspects, their parts or figures: its ports and parameters; or a file from elsewhere, such
+    as the variables of an FMU (*.fmu), or the topics of a recording of ROS 2.
     """
     from epicycle.actors import EpicycleError
 
@@ -196,15 +198,16 @@ def _weaving(options: argparse.Namespace) -> int:
 
 
 def _describe_type(options: argparse.Namespace) -> int:
-    """The description of a type, or of a class that stands in a parameter."""
+    """The description of a type, of a class that stands in a parameter, or of a figure."""
     from dataclasses import asdict, replace
 
     from epicycle.actors import EpicycleError, did_you_mean
 
     from ...model.catalogue.packaged import packaged_models
     from ...model.catalogue.reference import describe, parts_of
-    from ...model.catalogue.types import load_all
+    from ...model.catalogue.types import figure_types, load_all
     from ...show.reference import detail, parts_described
+    from ...show.report import study_figure_types
 
     known, name = known_types(options), options.model
     types = {**known.actors, **known.aspects}
@@ -212,18 +215,20 @@ def _describe_type(options: argparse.Namespace) -> int:
         reference, parts = describe(name, types[name]), parts_described([types[name]])
     else:
         loaded, _ = load_all(types)
-        of_bases = parts_of(loaded.values())
-        kinds = {base.__name__: found for base, found in of_bases.items() if name in found}
-        if not kinds:
-            variants = [each for found in of_bases.values() for each in found]
+        others: dict[str, Mapping[str, type[Configurable]]]
+        others = {base.__name__.lower(): found for base, found in parts_of(loaded.values()).items()}
+        others |= {"figure": figure_types(), "figure of studies": study_figure_types()}
+        kind = next((kind for kind, found in others.items() if name in found), None)
+        if kind is None:
+            variants = [each for found in others.values() for each in found]
             near = did_you_mean(name, [*types, *packaged_models(), *variants])
             raise EpicycleError(
                 f"there is no type or packaged model {name!r}{near}\n"
                 "   help: 'epicycle list models', 'epicycle list actors' and 'epicycle list aspects' list them\n"
                 "   help: for your own types, add '--types FILE.py'"
             )
-        ((base, found),) = kinds.items()
-        reference, parts = replace(describe(name, found[name]), kind=base.lower()), parts_described([found[name]])
+        found = others[kind][name]
+        reference, parts = replace(describe(name, found), kind=kind), parts_described([found])
     if options.json:
         tell_json({**asdict(reference), "parts": {k: [asdict(each) for each in v] for k, v in parts.items()}}, indent=2)
     else:

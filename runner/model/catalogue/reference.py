@@ -207,6 +207,7 @@ TOPICS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "situation": ("What depends on where bodies are: distance, range, line of sight, partition", ("situation",)),
     "execution": ("At actors: firings that take time or do not happen, crashes, clocks", ("clock", "execution")),
     "observation": ("At any port: observers that change nothing", ("observation",)),
+    "figures": ("What draws runs and studies", ("show",)),
 }
 
 

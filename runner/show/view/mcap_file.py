@@ -105,7 +105,9 @@ def _fitting(values: Iterable[Any], empty: str = "string") -> Schema:
         return {"type": "array", "items": _fitting(chain.from_iterable(found), "number")}
     if all(isinstance(value, bool) for value in found):
         return {"type": "boolean"}
-    return {"type": "string" if any(isinstance(value, (bool, str, dict, list)) for value in found) else "number"}
+    if any(isinstance(value, (bool, str, dict, list)) for value in found):
+        return {"type": "string"}
+    return {"type": "integer" if all(isinstance(value, int) for value in found) else "number"}
 
 
 def _flat(value: Any) -> Any:

@@ -41,6 +41,7 @@ class Varied(Actor):
     trigger: InputPort[Any] = InputPort(Any)
     pose = OutputPort(Any)
     number = OutputPort(float)
+    count = OutputPort(int)
 
     def initialize(self) -> None:
         self.sent = 0
@@ -50,6 +51,7 @@ class Varied(Actor):
             self.pose.send(SENT[self.sent])
         self.number.send(self.sent / 4)
         self.sent += 1
+        self.count.send(self.sent)
 
 
 VARIED = """

@@ -171,6 +171,11 @@ def test_mcap_has_tokens_of_any_kind_and_whole_nanoseconds(varied: Recording, tm
         "is_on": {"type": "boolean"},
     }
     assert [each.data["value"] for each in file["/signals/it/number"]] == [0.0, 0.25, 0.5]
+    whole = {name: file.schemas[f"epicycle.it.{name}"]["properties"] for name in ("number", "count")}
+    assert {name: {key: each["type"] for key, each in said.items()} for name, said in whole.items()} == {
+        "number": {"microstep": "integer", "value": "number"},
+        "count": {"microstep": "integer", "value": "integer"},
+    }
 
 
 def test_scenes_show_what_figures_place_in_space(wifi: Recording, tmp_path: Path) -> None:
