@@ -17,6 +17,7 @@ from typing import Annotated, Any, TypeAlias, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import arrays
 from .kept import folder, mark
 
 Array = NDArray[np.float64]  # the one array type of the kernels
@@ -112,7 +113,8 @@ def kernel(function: Function) -> Function:
     KERNELS.setdefault(function.__module__, []).append(function)
     if IS_PYTHON:
         return function
-    return cast(Function, entered(function) if IS_READY else Kernel(function))
+    # Numba's own entry is a function of Python, which no kernel can call.
+    return cast(Function, entered(function) if IS_READY and arrays.Entry is not None else Kernel(function))
 
 
 def entered(function: Callable[..., Any]) -> Any:

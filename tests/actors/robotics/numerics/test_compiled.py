@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from epicycle.actors import CORE
 from epicycle.actors.robotics.numerics import compiled, kept
 
 PROGRAM = """
@@ -33,10 +34,10 @@ print([twice_beyond(number) for number in {numbers}], "numba" in sys.modules)
 """
 
 
-def said(folder: Path, numbers: list[float], limit: float = 10.0) -> list[str]:
+def said(folder: Path, numbers: list[float], limit: float = 10.0, **variables: str) -> list[str]:
     program = folder / "program.py"
     program.write_text(PROGRAM.format(numbers=numbers, limit=limit))
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache"), "NUMBA_DISABLE_JIT": "0"}
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache"), "NUMBA_DISABLE_JIT": "0", **variables}
     done = subprocess.run([sys.executable, str(program)], env=environment, capture_output=True, text=True, check=True)
     assert not done.stderr
     return done.stdout.splitlines()
@@ -53,6 +54,16 @@ def test_the_first_process_takes_kernels_as_python_and_the_second_compiles_them(
 @pytest.mark.slow
 def test_a_process_that_spends_long_in_them_compiles_them(tmp_path: Path) -> None:
     assert said(tmp_path, [2.0, 4.0, 2.0], limit=1e-12) == ["prepared", "[3.0, 2.5, 3.0] True"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("core", sorted({"python", CORE}))
+def test_kernels_that_are_not_compiled_yet_where_others_are(core: str, tmp_path: Path) -> None:
+    """As a tracker's are after a run of a model without one."""
+    said(tmp_path, [2.0], EPICYCLE_CORE=core)
+    [first] = tmp_path.rglob("python")
+    first.with_name("compiled").touch()
+    assert said(tmp_path, [2.0, 4.0], EPICYCLE_CORE=core)[-1] == "[3.0, 2.5] True"
 
 
 @pytest.mark.slow
