@@ -259,8 +259,7 @@ class RobustController(TargetModel, Actor):
         problem, starts = self._problem(own)
         solution = self.solver.solve(problem, starts)
         controls, violation = solution.controls, solution.violation
-        # Inputs may be so large that their squares are not finite.
-        if not violation < math.inf and not finite(controls):
+        if not finite(controls):  # inputs may be so large that their squares are not, or a solver is wrong
             controls, violation = starts[1], math.inf  # braking
         self._send(own, problem, controls)
         self._infeasible += bool(violation > 0.0)  # which may be a NumPy type

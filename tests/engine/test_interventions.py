@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from epicycle.runner.execution.engine import Interventions, Simulation
+from epicycle.actors import Tag
+from epicycle.aspects import JoinPoint, PortAspect
+from epicycle.runner.execution.engine import ActorError, Interventions, Simulation
 from epicycle.runner.execution.results import Results
 from epicycle.runner.model.build.load import load_model
 from epicycle.runner.model.graph.acts import ActName
@@ -103,6 +106,23 @@ def test_without_its_acts_an_aspect_does_nothing(aspect: str) -> None:
     without, results = run(f"{head}aspects:\n  it: {aspect}\n", frozenset())
     assert without == plain
     assert results.acts == []
+
+
+class Trap(PortAspect):
+    """Fails at every token."""
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        raise RuntimeError("trapped")
+
+
+def test_what_fails_behind_an_aspect_that_is_over_is_not_its_fault() -> None:
+    model = load(f"{TEXT}  trap: {{type: Trap, at: probe.input}}\n", types=[Trap])
+    ends = dict.fromkeys(("lossy", "slow"), Tag(0, 0))
+    with pytest.raises(ActorError) as raised:
+        Simulation(model, acts=Interventions(ends=ends)).run()
+    assert str(raised.value).splitlines()[0] == (
+        "aspect trap failed in pass_token() at probe.input at (0 s, 1): RuntimeError: trapped"
+    )
 
 
 def test_snapshots_know_the_names() -> None:

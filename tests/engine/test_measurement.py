@@ -105,6 +105,12 @@ def test_what_holds_before_the_first_token_is_given_or_does_not_count() -> None:
     assert measured(tokens, 10 * SECOND, take="share", when="value == 'up'", initial="up").value == 0.6
 
 
+def test_a_quantile_over_time_counts_each_nanosecond() -> None:
+    tokens = [("a.out", value, value) for value in range(4)]  # 0, 1 and 2 for 1 ns each, then 3
+    found = [measured(tokens, end, take="time_quantile", p=0.5).value for end in (4, 5, 6, 7)]
+    assert found == [1.0, 2.0, 2.0, 3.0]
+
+
 def test_an_integral_is_of_values_times_seconds() -> None:
     tokens = [("a.out", 2 * SECOND, 3), ("a.out", 6 * SECOND, -0.5)]
     assert measured(tokens, 10 * SECOND, take="integral").value == 10.0  # 4 * 3 - 4 * 0.5
@@ -170,6 +176,7 @@ def test_of_several_ports_each_counts_for_its_own_time() -> None:
         ({"take": "sum"}, [(0, 10**400)], "a.out sent " + repr(10**400)[:97] + "..., which is not a number, at 0 s"),
         ({"take": "std"}, [(0, 1e300), (1, -1e300)], "it is too large for a number"),
         ({"take": "mean", "after": "mser5"}, [(0, 1.0)], "MSER-5 needs 50 tokens, but 1 came"),
+        ({"take": "mean", "after": "mser5"}, [(1, math.nan)], "a.out sent nan at 1 s"),
         ({"take": "time_mean", "after": "mser5"}, [(1, 1.0)] * 60, "MSER-5 needs time between tokens"),
         (
             {"take": "mean", "after": "mser5"},

@@ -88,3 +88,11 @@ def test_a_wait_of_years_is_slept_in_pieces() -> None:
     pace.wait_for(0)
     pace.wait_for(100_000)  # ns, of which one takes a second
     assert slept == [3_600.0] * 27 + [2_800.0]
+
+
+def test_progress_is_told_now_and_then_and_never_runs_back() -> None:
+    told: list[float] = []
+    Simulation(load("actors: {t: {type: Ticker}}")).run(until=99.0, progress=told.append)
+    assert 1 < len(told) < 100
+    assert told == sorted(set(told))
+    assert 0.0 <= told[0] < told[-1] <= 99.0

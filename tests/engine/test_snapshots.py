@@ -211,6 +211,11 @@ def test_simulations_in_threads() -> None:
     assert [found[seed] for seed in range(4)] == alone
 
 
+def test_when_nothing_is_left_there_is_no_more_to_come() -> None:
+    simulation = Simulation(load("actors: {t: {type: Ticker, limit: 3}}"))
+    assert [simulation.advance(1.0), simulation.advance(5.0)] == [True, False]
+
+
 def test_a_run_in_pieces() -> None:
     model = load("actors: {t: {type: Ticker}, probe: {type: Probe}}\nconnections: [t.output -> probe.input]\n")
     model.stop = 5

@@ -258,6 +258,7 @@ def test_plain_and_leaves() -> None:
         ("y.d[0]", None), ("y.d[1]", "x"),
     ]  # fmt: skip
     assert list(leaves([[], {}, (), np.zeros((0, 2))]))[:3] == [("[0]", []), ("[1]", {}), ("[2]", ())]
+    assert list(leaves({"a": np.array(2.5)})) == [("a", 2.5)]  # an array without an axis is one number
 
 
 def test_a_token_without_a_value_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -398,6 +399,14 @@ def test_paths_of_logs(tmp_path: Path) -> None:
         check_log_path(tmp_path / "log.txt")
     with pytest.raises(LogError, match="there is no folder"):
         check_log_path(tmp_path / "no" / "log.csv")
+
+
+@pytest.mark.parametrize("options", [{}, {"keep_log": True, "log_to": list[Record]().append}])
+def test_records_that_were_not_kept_are_no_frame(options: dict[str, Any]) -> None:
+    results = Simulation(load("actors: {t: {type: Ticker, limit: 3}}"), **options).run()
+    with pytest.raises(LogError) as caught:
+        results.log.to_pandas()
+    assert str(caught.value) == "the event log was not kept: make the run with Simulation(model, keep_log=True)"
 
 
 def test_a_parquet_log_is_written_in_large_pieces(tmp_path: Path) -> None:

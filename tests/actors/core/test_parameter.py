@@ -154,6 +154,24 @@ def test_a_part_is_made_from_a_mapping_and_counts_in_the_unit_around_it() -> Non
 
 
 @pytest.mark.parametrize(
+    ("values", "kind", "meant"),
+    [
+        ({"fro": 1}, "parameter", "from"),
+        ({"from": 1, "part": {"type": "Whel"}}, "type", "Wheel"),
+        ({"from": 1, "part": {"type": "Wheel", "size": "0 meters"}}, "unit", "0 m"),
+        ({"from": 1, "part": {"type": "Wheel", "size": "1 s"}}, "unit", "1 m"),
+        ({"from": 1, "part": {"type": "Wheel", "size": "wide"}}, "unit", ""),
+        ({"from": 1, "part": 3}, "", ""),
+    ],
+)
+def test_what_a_program_may_write_instead(values: dict[str, Any], kind: str, meant: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        Whole(**values)
+    [fault] = caught.value.faults
+    assert (fault.kind, fault.meant) == (kind, meant)
+
+
+@pytest.mark.parametrize(
     ("values", "message", "keys"),
     [
         ({}, "Whole needs a value for 'from'", ()),

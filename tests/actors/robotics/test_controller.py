@@ -2,6 +2,7 @@
 
 import functools
 import logging
+import math
 import sys
 import threading
 import time
@@ -277,15 +278,19 @@ def test_same_run_same_bits() -> None:
 class _Lost(_Recorder):
     """Finds nothing from the second time on."""
 
+    said = math.nan  # its violation then
+
     def solve(self, problem: object, starts: np.ndarray) -> Any:
         found = super().solve(problem, starts)
         if len(self.records) == 1:
             return found
-        return found._replace(controls=np.full_like(found.controls, np.nan), violation=np.nan)
+        return found._replace(controls=np.full_like(found.controls, np.nan), violation=self.said)
 
 
-def test_if_the_solver_finds_nothing_it_brakes() -> None:
+@pytest.mark.parametrize("said", [math.nan, math.inf, 0.0])
+def test_if_the_solver_finds_nothing_it_brakes(said: float) -> None:
     recorder = _Lost()
+    recorder.said = said
     harness = Harness(RobustController("main.controller", solver=recorder, horizon_from="now"))
     harness.fire(0.0, trigger=0, state=state())
     assert harness.last("control")[0] < -7.0

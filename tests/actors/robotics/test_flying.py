@@ -1,11 +1,14 @@
 """Robots that fly: their limits, what they see past what stands on the ground, and the packaged model."""
 
 import importlib
+import math
 
 import numpy as np
 import pytest
 
-from epicycle.actors import BodyState, Estimate, Measurement, Plan
+from epicycle.actors import BodyState, DoubleIntegrator, Estimate, Measurement, Plan, Sensor
+from epicycle.actors.robotics.sight import disturbed
+from epicycle.actors.testing import Harness
 from epicycle.runner import Results, Simulation, load_model
 
 sight = importlib.import_module("epicycle.actors.robotics.sight")
@@ -141,3 +144,32 @@ def test_the_main_robot_keeps_out_of_the_pillars(run: Results) -> None:
     places = np.array([each.position for each in run.signals["main.state"].tokens])
     for x, y in [(21.0, 0.5), (17.0, -5.0), (15.5, 5.0), (7.0, -4.0), (6.0, 3.5)]:
         assert np.hypot(places[:, 0] - x, places[:, 1] - y).min() >= 2.5 - 1e-6
+
+
+def test_braking_against_any_velocity_is_within_the_limits_of_climbing() -> None:
+    motion = DoubleIntegrator(dimensions=3, max_acceleration=8.0, climb_acceleration=2.0)
+    for velocity in np.random.default_rng(1).normal(0.0, 5.0, (50, 3)).tolist():
+        braking = np.array(motion.braking([0.0, 0.0, 0.0, *velocity], 0.1))
+        assert np.cross(braking, velocity) == pytest.approx(np.zeros(3), abs=1e-9)
+        assert braking @ velocity < 0.0
+        (share,) = np.array(motion.control_limits(braking))  # below 0 within the limits, in (m/s^2)^2
+        assert share == pytest.approx((0.95**2 - 1.0) * 64.0)
+
+
+def test_errors_in_space_are_along_across_and_upright() -> None:
+    """To the line of sight: three directions at right angles, the second of them level."""
+    offset, level, length = (2.0, 3.0, 6.0), math.sqrt(13.0), 7.0
+    errors = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+    axes = np.array([disturbed(offset, level, length, *each) for each in errors]) - offset
+    assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert axes[0] == pytest.approx(np.array(offset) / 7.0)
+    assert axes[1] == pytest.approx(np.array([-3.0, 2.0, 0.0]) / level)
+    assert axes[2, 2] > 0.0
+
+
+@pytest.mark.parametrize(("height", "is_near"), [(3.0, True), (3.1, False)])
+def test_a_target_in_the_plane_is_on_the_ground(height: float, is_near: bool) -> None:
+    sensor = Harness(Sensor("s", max_range=5.0))
+    above = BodyState((0.0, 0.0, height), np.zeros(3), 0.0)
+    sensor.fire(0.0, robot=above, target=BodyState((4.0, 0.0), np.zeros(2), 0.0))
+    assert (len(sensor.tokens("measurement")) == 1) == is_near

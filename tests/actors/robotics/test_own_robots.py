@@ -17,14 +17,18 @@ from epicycle.actors import (
     ExtendedEstimator,
     FilterPyEstimator,
     Inform,
+    Measurement,
     ParameterError,
+    ParticleEstimator,
     Plan,
     ReachGoal,
     RobustController,
+    SampledEstimate,
     Sensor,
     StayNear,
     UnscentedEstimator,
     Vehicle,
+    symbolic,
 )
 from epicycle.actors.testing import Harness
 from epicycle.runner import Model, Results, Simulation, load_model
@@ -248,6 +252,35 @@ def test_inform_uses_the_samples_of_a_particle_filter(folder: Path) -> None:
     assert np.hypot(*(moved[-1] - moved[0])) > 3.0
 
 
+def test_particles_that_are_drawn_again_count_the_same() -> None:
+    """One measurement that nearly all of them contradict, and the belief is where it says."""
+    harness = Harness(ParticleEstimator("e", particles=2000, prior_mean=(10, 0, 0, 0), prior_variance=(4, 4, 1, 1)))
+    seen = Measurement("a", np.zeros(2), "relative_position", np.array([11.0, 1.0]), 0.2, 0.2, 0.0)
+    harness.fire(0.0, trigger=0, measurements=[seen])
+    found = harness.last("estimate")
+    assert found.weights.sum() == pytest.approx(1.0)
+    assert found.mean[:2] == pytest.approx([11.0, 1.0], abs=0.1)
+    assert np.diag(found.covariance)[:2] == pytest.approx([0.04, 0.04], rel=0.3)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+@pytest.mark.parametrize("size", [4, 6])
+def test_samples_move_on_to_the_end_of_the_horizon(size: int, dimensions: int) -> None:
+    """In the plane and in space, whatever the robot's own space is."""
+    controller = RobustController("main.a", objective=Inform(), dimensions=dimensions, horizon_from="now")
+    samples = np.arange(1.0, 1.0 + 2 * size).reshape(2, size)
+    told = SampledEstimate(np.zeros(size), np.eye(size), 0.1, samples=samples, weights=[0.25, 0.75])
+    own = BodyState((30.0, 0.0, 5.0)[:dimensions], np.zeros(dimensions), 0.3)
+    harness = Harness(controller)
+    harness.fire(0.3, trigger=0, state=own, estimate=told)
+    problem, _ = controller._problem(own)
+    places, velocities = samples[:, : size // 2], samples[:, size // 2 :]
+    expected = np.zeros((2, 3))
+    expected[:, : size // 2] = places + 1.2 * velocities
+    assert problem.samples == pytest.approx(expected[:, :dimensions])
+    assert problem.weights.tolist() == [0.25, 0.75]
+
+
 # --- a solver -------------------------------------------------------------------------------------------
 
 
@@ -298,3 +331,22 @@ def test_a_problem_is_what_the_kernels_solve(objective: Any, dimensions: int, ra
     assert found.objective == pytest.approx(problem.cost(found.controls), rel=1e-9)
     assert found.violation == pytest.approx(max(0.0, problem.constraints(found.controls).max()), abs=1e-6)
     assert problem.limits(found.controls).max() <= 1e-9
+
+
+def test_problems_of_the_same_form_are_compiled_once() -> None:
+    """The form is what their dynamics and objectives are, with all parameters, and not who holds them."""
+
+    def key(**changed: float) -> object:
+        own = BodyState((9.0, 0.0), np.zeros(2), 0.0)
+        harness = Harness(RobustController("a", objective=Inform(**changed)))
+        harness.fire(0.0, trigger=0, state=own)
+        return harness.actor._problem(own)[0].key
+
+    assert key() == key() == key(range=30.0)
+    assert key() != key(range=31.0)
+    assert hash(key()) == hash(key())
+
+
+def test_the_length_of_a_vector() -> None:
+    assert symbolic.norm([3.0, 4.0]) == pytest.approx(5.0)
+    assert symbolic.norm(np.array([2.0, 3.0, 6.0])) == pytest.approx(7.0)

@@ -171,6 +171,11 @@ def test_a_goal_in_the_air_for_a_robot_on_the_ground() -> None:
         (RobustController, {"peers_at_start": [[1, 2, 3]]}, "peers_at_start: places have 3 numbers; expected 2"),
         (
             RobustController,
+            {"dimensions": 3, "peers_at_start": [[1, 2]]},
+            "peers_at_start: places have 2 numbers; expected 3",
+        ),
+        (
+            RobustController,
             {"peers_at_start": [[1, 2, 3], [1, 2]]},
             "main.a: RobustController.peers_at_start: some places have a height, and others have none",
         ),

@@ -18,8 +18,6 @@ from epicycle.actors import EpicycleError
 from epicycle.aspects import Bus, FieldError, Medium, RadioMedium
 from tests.aspects.bench import SECOND, Bench
 
-pytestmark = pytest.mark.slow
-
 SURE = 0.999
 
 
@@ -39,7 +37,8 @@ def is_mean(values: NDArray[np.float64], mean: float, batches: int = 40) -> bool
 # -- the bus -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("load", [pytest.param(0.3, marks=pytest.mark.slow), 0.8])
+@pytest.mark.slow
+@pytest.mark.parametrize("load", [0.3, 0.8])
 def test_bus_is_an_m_d_1_queue(load: float) -> None:
     service, count = 1e-3, 40_000
     times = poisson(load / service, count, seed=3)
@@ -63,6 +62,7 @@ def test_bus_is_an_m_d_1_queue(load: float) -> None:
     assert len(bench.of("delayed")) == count
 
 
+@pytest.mark.slow
 def test_priorities_follow_cobham() -> None:
     count, service, loads = 60_000, 1e-3, (0.3, 0.5)
     times = poisson(sum(loads) / service, count, seed=5)
@@ -80,6 +80,7 @@ def test_priorities_follow_cobham() -> None:
         assert (np.diff(times[class_] + waits[class_]) > 0).all()
 
 
+@pytest.mark.slow
 def test_bus_without_a_place_to_wait_loses_as_erlang_says() -> None:
     service, count, load = 1e-3, 40_000, 0.8
     bench = Bench(a=Bus(factor=service, capacity=0)).play_at(
@@ -160,7 +161,8 @@ def radio(**parameters: Any) -> RadioMedium:
     return RadioMedium(**{"message_length": "1 kbit", "rate": "1 Mbit/s", **parameters})
 
 
-@pytest.mark.parametrize("load", [0.2, pytest.param(1.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("load", [0.2, 1.0])
 def test_aloha(load: float) -> None:
     count = 10_000
     aloha = radio(carrier_sense=False, window=1, retries=0)
@@ -178,7 +180,8 @@ def test_aloha(load: float) -> None:
     assert len(bench.of("collided")) == len(bench.of("dropped")) == count - through.sum()
 
 
-@pytest.mark.parametrize(("robots", "window"), [(2, 4), pytest.param(5, 16, marks=pytest.mark.slow), (12, 32)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("robots", "window"), [(2, 4), (5, 16), (12, 32)])
 def test_broadcasts_at_once_are_heard_if_their_backoffs_differ(robots: int, window: int) -> None:
     ticks = 1600
     bench = Bench(radio=radio(window=window, slot="20 us", retries=0)).play_at(
@@ -224,6 +227,7 @@ def all_busy(bench: Bench, each: int) -> float:
     raise AssertionError("no station has sent all")
 
 
+@pytest.mark.slow
 def test_two_stations_follow_the_markov_chain_of_their_backoffs() -> None:
     window, each = 4, 6000
     # State: the slots that each still has to count; it moves once a slot, a transmission being one slot, too.
@@ -241,6 +245,7 @@ def test_two_stations_follow_the_markov_chain_of_their_backoffs() -> None:
     assert is_mean(transmissions(bench, all_busy(bench, each)), float(collided))
 
 
+@pytest.mark.slow
 def test_saturated_stations_follow_bianchi() -> None:
     stations, each, window, doublings, slot, airtime = 10, 1200, 32, 3, 50e-6, 1e-3
 
@@ -259,6 +264,7 @@ def test_saturated_stations_follow_bianchi() -> None:
     assert sum(time <= end for time, _, _ in bench.out) * airtime / end == pytest.approx(throughput, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_window_doubles() -> None:
     slot, tries = 50e-6, 6
     drawn: list[list[int]] = [[] for _ in range(tries)]
@@ -282,6 +288,7 @@ def test_the_window_doubles() -> None:
         assert stats.chisquare(counts).pvalue > 1 - SURE
 
 
+@pytest.mark.slow
 def test_capture_and_loss() -> None:
     count = 4000
     both = [(0.1 * index, f"{name}.radio", index) for index in range(count) for name in "ab"]

@@ -13,7 +13,7 @@ from tests.actors.robotics.numerics.numerics_parts import (
     solve,
 )
 
-horizon = importlib.import_module(PREFIX + "horizon")
+horizon, newton, task = (importlib.import_module(PREFIX + name) for name in ("horizon", "newton", "task"))
 
 
 def test_an_observer_gains_information(random: np.random.Generator) -> None:
@@ -37,6 +37,25 @@ def test_solution_is_stationary(random: np.random.Generator, kind: str) -> None:
         step = random.normal(size=(6, 2))
         trial = solution.controls + step * random.choice([1e-3, 1e-2, 0.1])
         assert objective_by_definition(problem, trial) > value - gap
+
+
+def moved(posed: "task.Task", length: float, mu: float) -> float:
+    """What is minimised, so far along a step."""
+    task.move(posed, length)
+    return float(task.evaluate(posed, task.Phase.OPTIMISE, mu, mu, np.inf))
+
+
+@pytest.mark.parametrize("mu", [1.0, 0.01])
+def test_a_step_begins_with_its_slope(random: np.random.Generator, mu: float) -> None:
+    """What is minimised, with f6 smoothed, changes along a Newton step as its derivatives say."""
+    zero = (0.0, 0.0)
+    for _ in range(10):
+        problem = inform_problem(random)._replace(max_speed=1e3, max_acceleration=1e3)
+        posed = task.new_task(problem, 10, 10, np.inf, np.empty(task.room_for(problem, 10, 2)), zero)
+        moved(posed, 0.0, mu)
+        slope = newton.newton_step(posed.stages, posed.period, posed.free, zero)
+        difference = moved(posed, 1e-6, mu) - moved(posed, -1e-6, mu)
+        assert difference / 2e-6 == pytest.approx(slope, rel=1e-4)
 
 
 def test_a_start_that_is_too_fast_on_the_way_is_left_out(random: np.random.Generator) -> None:

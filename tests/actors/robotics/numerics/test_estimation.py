@@ -55,7 +55,7 @@ def test_200_steps_agree_with_filterpy(kind: int) -> None:
     for step in range(200):
         mean, covariance = ukf.predict(mean, covariance, ukf.constant_velocity(0.1), PROCESS_NOISE)
         oracle.predict()
-        count = int(random.integers(0, 4)) if step else 3
+        count = int(random.integers(0, 7)) if step else 3  # up to 12 rows, and 9 sigma points
         if count:
             observers, values = measure(random, kind, count)
             width = 1 if kind == ukf.RANGE else 2
@@ -186,3 +186,7 @@ def test_a_step_is_prediction_noise_and_update_in_turn(averaged: bool) -> None:
     for useless in (np.empty((0, 7)), rows):
         mean, covariance, fused = ukf.predict_and_fuse(*PRIOR, transition, PROCESS_NOISE, 0.5, useless, averaged)
         assert (mean.tolist(), covariance.tolist(), fused) == (predicted[0].tolist(), predicted[1].tolist(), False)
+
+
+def test_a_direction_without_variance_gains_nothing() -> None:
+    assert ukf._gain(np.diag([4.0, 0.0]), np.array([[1.0, 5.0]])).tolist() == [[0.25, 0.0]]

@@ -67,6 +67,17 @@ def test_it_is_nearer_to_bayes_than_an_ellipse_turned_as_predicted() -> None:
     assert np.mean(misses["here"]) < 0.5 * np.mean(misses["ukf"])
 
 
+def test_far_away_it_is_the_kalman_filter() -> None:
+    """Where a line of sight hardly turns, noise as large along it as across it makes a linear measurement."""
+    mean, covariance = np.array([1e4, 0.0, 1.0, 2.0]), np.array([[2.0, 0.5, 1.0, 0.0], [0.5, 1.0, 0.0, 0.5]] * 2)
+    covariance[2:] = [[1.0, 0.0, 3.0, 0.0], [0.0, 0.5, 0.0, 2.0]]
+    measurement = np.array([[ukf.RELATIVE_POSITION, 0.0, 0.0, 1e4 + 1.0, -0.5, 0.5, 0.5]])
+    then, spread, _ = sight.predict_and_fuse(mean, covariance, STAY, STILL, 0.0, measurement, NORMAL)
+    gain = covariance[:, :2] @ np.linalg.inv(covariance[:2, :2] + 0.25 * np.eye(2))
+    assert then == pytest.approx(mean + gain @ [1.0, -0.5], abs=1e-3)
+    assert spread == pytest.approx(covariance - gain @ covariance[:2], abs=1e-3)
+
+
 def test_a_surprise_widens_the_estimate() -> None:
     mean, covariance = np.array([10.0, 0.0, 0.0, 0.0]), np.diag([0.1, 0.1, 1.0, 1.0])
     for x, is_wider in ((10.1, False), (13.0, True)):
