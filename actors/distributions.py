@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from .core import (
     Configurable,
@@ -83,6 +84,10 @@ class LogNormal(Distribution):
 
 class Exponential(Distribution):
     """The exponential distribution: waiting times without memory."""
+
+    refused: ClassVar[Mapping[str, str]] = {
+        "rate": "Exponential has no parameter 'rate': give 'mean', which is 1 / rate"
+    }
 
     mean = Parameter(float, 1.0, min=0, doc="the mean, 1 / rate")
 

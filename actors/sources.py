@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from .core import (
@@ -190,6 +191,9 @@ class PoissonClock(_Ticking):
     """
 
     is_source: ClassVar[bool] = True
+    refused: ClassVar[Mapping[str, str]] = {
+        "rate": "PoissonClock has no parameter 'rate': give 'mean_interval', which is 1 / rate"
+    }
 
     trigger = InputPort(multi=True, required=False, doc="causes a tick at once")
 
