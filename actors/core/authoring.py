@@ -123,8 +123,4 @@ class Pending(Generic[T]):
 
     def due(self) -> list[T]:
         """Take the values whose time is the present tag, in the order in which they were put."""
-        line = self._line
-        values: list[T] = []
-        while line.is_due():
-            values.append(line.pop())
-        return values
+        return self._line.due()

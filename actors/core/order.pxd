@@ -33,4 +33,5 @@ cdef class TimedQueue:
     cdef bint is_before(self, long long time, long microstep) noexcept
     cpdef bint is_due(self) except -1
     cpdef pop(self)
+    cpdef list due(self)
     cdef int _insert(self, Item item, wake, value) except -1

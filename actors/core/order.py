@@ -74,3 +74,10 @@ class TimedQueue:
     def pop(self) -> Any:
         """Remove the first one."""
         return heappop(self.content)[4]
+
+    def due(self) -> list[Any]:
+        """Remove those whose wake-ups are due; gives them in their order."""
+        values = []
+        while self.is_due():
+            values.append(self.pop())
+        return values

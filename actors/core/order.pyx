@@ -146,6 +146,12 @@ cdef class TimedQueue:
     cpdef bint is_due(self) except -1:
         return self.size > 0 and (<Wake>self.wakes[self.heap[0].place]).due
 
+    cpdef list due(self):
+        cdef list values = []
+        while self.is_due():
+            values.append(self.pop())
+        return values
+
     cdef bint is_before(self, long long time, long microstep) noexcept:
         """Whether the first waits for this tag, or for an earlier one."""
         cdef Item* heap = self.heap

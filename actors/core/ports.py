@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Callable
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any, ClassVar, Generic
 
 from .errors import EpicycleError
@@ -24,6 +25,7 @@ else:
     T = TypeVar("T")
 
 _ANY: Any = Any
+_FIRST: Any = itemgetter(0)
 NO_TOKENS: list[Any] = []  # of all ports at which no token has arrived; nothing is added to it
 
 
@@ -224,6 +226,12 @@ class InputPort(Port[T]):
         for token, channel in zip(self.shown, self.channels or (), strict=False):
             result[channel].append(token)
         return result
+
+    def arrivals(self) -> list[tuple[int, T]]:
+        """The tokens of the present tag, each with its channel, the lowest channel first."""
+        if self.width == 1 or not self.shown:
+            return [(0, token) for token in self.shown]
+        return sorted(zip(self.channels or (), self.shown, strict=False), key=_FIRST)
 
     def receive(self, token: Any, channel: int) -> None:
         """Engine: a token arrives."""

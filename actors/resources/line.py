@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from ..core import EpicycleError, InputPort, OutputPort, Parameter
 from ..expression import TokenFormulaParameter
-from .waiting import WaitingActor, check_channels
+from .waiting import Waiter, WaitingActor, check_channels
 
 
 class WaitingLine(WaitingActor):
@@ -43,37 +43,30 @@ class WaitingLine(WaitingActor):
     def initialize(self) -> None:
         super().initialize()
         check_channels(self, "trigger", "output")
+        self._answers_by_channel = self.trigger.width > 1 and self.output.width > 1
         self._credits = self.credits * max(self.trigger.width, 1)  # that are left, for the channels in turn
         self._triggers: deque[int] = deque()
 
-    def fire(self) -> None:
-        self._send()
-        self._renege()
-        if self.trigger.present:
-            for channel, tokens in enumerate(self.trigger.by_channel()):
-                self._triggers.extend([channel] * len(tokens))
-        newcomers = []
-        if self.input.present:
-            for channel, tokens in enumerate(self.input.by_channel()):
-                for token in tokens:
-                    newcomers.append(self._waiter(token, channel, self._size(token, channel)))
-        self._join(newcomers, self._serve)
+    def _make_room(self) -> bool:
+        self._triggers.extend(channel for channel, _ in self.trigger.arrivals())
+        return self.trigger.present
+
+    def _newcomer(self, token: Any, channel: int, now: float) -> Waiter:
+        size = self.size.number("a size", token, now, channel)
+        if size < 0:
+            raise EpicycleError(f"{self.size} gives {size:g}, but a size must be >= 0")
+        return self._waiter(token, channel, now, size)
+
+    def _serve(self) -> None:
+        while self._waiting and (self._credits or self._triggers):
+            channel = self._next_channel()
+            self._tell("output", self._waiting.take().token, channel if self._answers_by_channel else None)
         if not self.persistent_trigger:
             self._credits = 0
             self._triggers.clear()
+
+    def _tell_counts(self) -> None:
         self._tell_count("waiting", len(self._waiting))
-
-    def _size(self, token: Any, channel: int) -> float:
-        size = self.size.number("a size", token, self.now, channel)
-        if size < 0:
-            raise EpicycleError(f"{self.size} gives {size:g}, but a size must be >= 0")
-        return size
-
-    def _serve(self) -> None:
-        while (self._credits or self._triggers) and len(self._waiting):
-            first, channel = self._waiting.first, self._next_channel()
-            self._waiting.remove(first)
-            self._tell("output", first.token, channel if self.trigger.width > 1 and self.output.width > 1 else None)
 
     def _next_channel(self) -> int:
         if not self._credits:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from operator import and_
+from operator import add, and_, sub
 from typing import Any, ClassVar
 
 from ..core import (
@@ -52,59 +51,42 @@ class _Pools(WaitingActor):
                 f"{self.release.width}; give it 1 channel, or as many, because units are released on the channel of "
                 "their request"
             )
+        self._is_by_channel = self.release.width == self.acquire.width
         self._held: list[Waiter] = []  # in the order in which they were granted
-        self._in_use = [0] * len(self._capacities())  # by kind
-        self._capacities_before: Sequence[int] = ()  # at the firing before
+        self._capacities = self._units()  # of each kind, at the latest firing
+        self._in_use = [0] * len(self._capacities)
         self._has_begun_anew = False
 
     def restart(self) -> None:
         super().restart()
         self._has_begun_anew = True  # and may return what it does not know
 
-    def fire(self) -> None:
-        self._send()
-        has_lost = self._renege()
-        capacities = self._capacities()
-        if not (has_lost or self.release.present or self.acquire.present or capacities != self._capacities_before):
-            return  # it was only to send
-        self._capacities_before = capacities
-        if self.release.present:
-            for channel, tokens in enumerate(self.release.by_channel()):
-                for token in tokens:
-                    self._return(token, channel)
-        newcomers = []
-        if self.acquire.present:
-            for channel, tokens in enumerate(self.acquire.by_channel()):
-                for token in tokens:
-                    newcomers.append(self._request(token, channel))
-        self._join(newcomers, self._serve)
-        self._tell_in_use()
-        self._tell_count("waiting", len(self._waiting))
-
     # To be defined by a subclass.
 
-    def _capacities(self) -> Sequence[int]:
+    def _units(self) -> tuple[int, ...]:
         """The present number of units of each kind."""
         raise NotImplementedError
 
-    def _amounts(self, token: Any, channel: int) -> tuple[int, ...]:
+    def _amounts(self, token: Any, channel: int, now: float) -> tuple[int, ...]:
         """How many of each kind a token requests."""
-        raise NotImplementedError
-
-    def _tell_in_use(self) -> None:
-        """Tell how many units are held."""
         raise NotImplementedError
 
     # Requests
 
-    def _request(self, token: Any, channel: int) -> Waiter:
-        amounts = self._amounts(token, channel)
-        waiter = self._waiter(token, channel, 1.0)
-        waiter.amounts = amounts
-        return waiter
+    def _make_room(self) -> bool:
+        units = self._units()
+        if units == self._capacities and not self.release.present:
+            return False
+        self._capacities = units
+        for channel, token in self.release.arrivals():
+            self._return(token, channel)
+        return True
 
-    def _amount(self, formula: TokenFormula, token: Any, channel: int, least: int) -> int:
-        amount = formula.number("an amount", token, self.now, channel)
+    def _newcomer(self, token: Any, channel: int, now: float) -> Waiter:
+        return self._waiter(token, channel, now, amounts=self._amounts(token, channel, now))
+
+    def _amount(self, formula: TokenFormula, token: Any, channel: int, now: float, least: int) -> int:
+        amount = formula.number("an amount", token, now, channel)
         if amount != int(amount) or amount < least:
             raise EpicycleError(f"{formula} gives {amount:g}, but an amount must be a whole number >= {least}")
         return int(amount)
@@ -112,68 +94,68 @@ class _Pools(WaitingActor):
     def _return(self, token: Any, channel: int) -> None:
         wanted = None if self.key is None else self.key.call(token)
 
-        def is_meant(request: Waiter) -> bool:
-            if self.release.width == self.acquire.width and request.channel != channel:
-                return False
-            if self.key is None:
-                return True
-            if request.mark is None:
-                request.mark = (self.key.call(request.token),)
-            return bool(request.mark[0] == wanted)
-
-        held = next(filter(is_meant, self._held), None)
-        if held is not None:
-            self._give_back(held)
-            return
-        waiting = min(filter(is_meant, self._waiting), key=lambda each: each.number, default=None)
-        if waiting is not None:
-            self._waiting.remove(waiting)
+        for held in self._held:
+            if self._is_meant(held, channel, wanted):
+                self._give_back(held)
+                return
+        waiting = [each for each in self._waiting if self._is_meant(each, channel, wanted)]
+        if waiting:
+            self._waiting.remove(min(waiting, key=lambda each: each.number))
         elif not self._has_begun_anew:
             what = "" if self.key is None else f" with the key {wanted!r}"
             raise EpicycleError(
                 f"{self.release.path} got {brief(token)} on channel {channel}, which has no request{what}"
             )
 
+    def _is_meant(self, request: Waiter, channel: int, wanted: Any) -> bool:
+        """Whether a release on a channel, with a value of the key, is of a request."""
+        if self._is_by_channel and request.channel != channel:
+            return False
+        if self.key is None:
+            return True
+        if request.mark is None:
+            request.mark = (self.key.call(request.token),)
+        return bool(request.mark[0] == wanted)
+
     def _serve(self) -> None:
         """Grant requests that have none ahead of them at any of their kinds while there are units."""
-        capacities = self._capacities()
         if self.preemptive:
-            excess = [used - there for used, there in zip(self._in_use, capacities, strict=True)]
+            excess = [used - there for used, there in zip(self._in_use, self._capacities, strict=True)]
             self._take_back(self._last_of(self._held, excess)[0])
         claimed: list[bool] = []  # kinds for which a request waits
         place = 0
         while place < len(self._waiting) and not (claimed and all(claimed)):
             request = self._waiting[place]
-            if not (claimed and any(map(and_, claimed, map(bool, request.amounts)))):
-                losers = self._losers_to(request, capacities)
-                if losers is not None:
-                    self._take_back(losers)  # which wait behind it
-                    self._waiting.remove(request)
-                    self._hold(request)
-                    continue
-            before = claimed or [False] * len(capacities)
-            claimed = [each or amount > 0 for each, amount in zip(before, request.amounts, strict=True)]
-            place += 1
+            if claimed and any(map(and_, claimed, map(bool, request.amounts))):
+                is_granted = False
+            else:
+                is_granted = self._are_free(request.amounts) or (self.preemptive and self._has_preempted_for(request))
+            if is_granted:
+                self._held.append(self._waiting.take(place))
+                self._in_use = list(map(add, self._in_use, request.amounts))
+                self._tell_of("granted", request)
+            else:
+                before = claimed or [False] * len(self._capacities)
+                claimed = [each or amount > 0 for each, amount in zip(before, request.amounts, strict=True)]
+                place += 1
 
-    def _losers_to(self, request: Waiter, capacities: Sequence[int]) -> list[Waiter] | None:
-        """Those that have to give up their units for a request; None if that is not enough."""
-        if self._are_free(request.amounts, capacities):
-            return []
-        if not self.preemptive:
-            return None
-        lacking = [
-            amount + used - there if amount else 0
-            for amount, used, there in zip(request.amounts, self._in_use, capacities, strict=True)
-        ]
-        later = [each for each in self._held if each.order > request.order]
-        losers, is_enough = self._last_of(later, lacking)
-        return losers if is_enough else None
-
-    def _are_free(self, amounts: Sequence[int], capacities: Sequence[int]) -> bool:
-        for amount, used, there in zip(amounts, self._in_use, capacities, strict=True):
+    def _are_free(self, amounts: tuple[int, ...]) -> bool:
+        for amount, used, there in zip(amounts, self._in_use, self._capacities, strict=True):
             if amount and amount + used > there:
                 return False
         return True
+
+    def _has_preempted_for(self, request: Waiter) -> bool:
+        """Let others give up their units for a request, and wait behind it, if that is enough; whether it was."""
+        lacking = [
+            amount + used - there if amount else 0
+            for amount, used, there in zip(request.amounts, self._in_use, self._capacities, strict=True)
+        ]
+        later = [each for each in self._held if each.order > request.order]
+        losers, is_enough = self._last_of(later, lacking)
+        if is_enough:
+            self._take_back(losers)
+        return is_enough
 
     def _last_of(self, holders: list[Waiter], lacking: list[int]) -> tuple[list[Waiter], bool]:
         """The last requests that together hold what is lacking of each kind, and whether they do."""
@@ -191,16 +173,9 @@ class _Pools(WaitingActor):
             self._waiting.add(each)
             self._tell_of("preempted", each)
 
-    def _hold(self, request: Waiter) -> None:
-        self._held.append(request)
-        for kind, amount in enumerate(request.amounts):
-            self._in_use[kind] += amount
-        self._tell_of("granted", request)
-
     def _give_back(self, request: Waiter) -> None:
         self._held.remove(request)
-        for kind, amount in enumerate(request.amounts):
-            self._in_use[kind] -= amount
+        self._in_use = list(map(sub, self._in_use, request.amounts))
 
 
 class Pool(_Pools):
@@ -239,18 +214,19 @@ class Pool(_Pools):
         doc="number of units requested: an expression over the token's fields, token, time, channel",
     )
 
-    def _capacities(self) -> Sequence[int]:
+    def _units(self) -> tuple[int, ...]:
         return (self.capacity,)
 
-    def _amounts(self, token: Any, channel: int) -> tuple[int, ...]:
-        amount = self._amount(self.amount, token, channel, least=1)
-        if amount > self.capacity and not self.inputs["capacity"].width:
+    def _amounts(self, token: Any, channel: int, now: float) -> tuple[int, ...]:
+        amount = self._amount(self.amount, token, channel, now, least=1)
+        if amount > self._capacities[0] and not self.inputs["capacity"].width:
             have = counted(self.capacity, "unit")
             raise EpicycleError(f"{brief(token)} requests {amount:g} of {have} and would wait for ever")
         return (amount,)
 
-    def _tell_in_use(self) -> None:
+    def _tell_counts(self) -> None:
         self._tell_count("in_use", self._in_use[0])
+        self._tell_count("waiting", len(self._waiting))
 
 
 class Pools(_Pools):
@@ -321,13 +297,13 @@ class Pools(_Pools):
                 self._present[name] = units
         super().fire()
 
-    def _capacities(self) -> Sequence[int]:
+    def _units(self) -> tuple[int, ...]:
         return tuple(self._present.values())
 
-    def _amounts(self, token: Any, channel: int) -> tuple[int, ...]:
+    def _amounts(self, token: Any, channel: int, now: float) -> tuple[int, ...]:
         amounts = dict.fromkeys(self.capacity, 1 if self.amount is None else 0)
         for name, formula in (self.amount or {}).items():
-            amounts[name] = self._amount(formula, token, channel, least=0)
+            amounts[name] = self._amount(formula, token, channel, now, least=0)
         if not any(amounts.values()):
             raise EpicycleError(f"{brief(token)} requests nothing from any of {', '.join(amounts)}")
         for name, amount in amounts.items():
@@ -336,6 +312,7 @@ class Pools(_Pools):
                 raise EpicycleError(f"{brief(token)} requests {amount:g} of {have} of {name} and would wait for ever")
         return tuple(amounts.values())
 
-    def _tell_in_use(self) -> None:
+    def _tell_counts(self) -> None:
         for name, used in zip(self.capacity, self._in_use, strict=True):
             self._tell_count(f"{name}_in_use", used)
+        self._tell_count("waiting", len(self._waiting))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, insort
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from operator import attrgetter
 from typing import Any, ClassVar, Final
 
-from ..core import Actor, EpicycleError, Parameter, ParameterError, Pending, PortError, Wake
+from ..core import Actor, EpicycleError, OutputPort, Parameter, ParameterError, PortError, TimedQueue, Wake
 from ..core.units import quantity
 from ..distributions import Distribution
 from ..expression import Formula, TokenFormula, TokenFormulaParameter
@@ -54,14 +54,23 @@ class Waiter:
 
     __slots__ = ("amounts", "channel", "key", "mark", "number", "order", "patience", "size", "token")
 
-    def __init__(self, token: Any, channel: int, order: float, place: float, size: float, number: int) -> None:
+    def __init__(
+        self,
+        token: Any,
+        channel: int,
+        order: float,
+        place: float,
+        size: float,
+        number: int,
+        amounts: tuple[int, ...] = (),
+    ) -> None:
         self.token = token
         self.channel = channel
         self.order = order
         self.size = size
         self.number = number
         self.key = order, place, number  # the lower one goes first
-        self.amounts: tuple[int, ...] = ()  # of requested units, by kind
+        self.amounts = amounts  # of requested units, by kind
         self.patience: Wake | None = None
         self.mark: tuple[Any] | None = None  # what it has in common with its release, once somebody has asked
 
@@ -75,20 +84,20 @@ class Waiters(list[Waiter]):
 
     def remove(self, waiter: Waiter) -> None:
         """Remove one."""
-        del self[bisect_left(self, waiter.key, key=_KEY)]
+        self.take(bisect_left(self, waiter.key, key=_KEY))
+
+    def take(self, place: int = 0) -> Waiter:
+        """Remove and return the one at a place: the next one to go, if none is given."""
+        waiter = self.pop(place)
         if waiter.patience is not None:
             waiter.patience.cancel()
             waiter.patience = None
+        return waiter
 
     def __contains__(self, waiter: object) -> bool:
         assert isinstance(waiter, Waiter)
         place = bisect_left(self, waiter.key, key=_KEY)
         return place < len(self) and self[place] is waiter
-
-    @property
-    def first(self) -> Waiter:
-        """The next one to go."""
-        return self[0]
 
 
 class WaitingActor(Actor):
@@ -126,59 +135,87 @@ class WaitingActor(Actor):
 
     def initialize(self) -> None:
         self._waiting = Waiters()
-        self._told: Pending[list[tuple[str, Any, int | None]]] = Pending(self)
-        self._telling: list[tuple[str, Any, int | None]] | None = None  # by the present firing
-        self._counts: dict[str, int] = {}  # the values sent last
-        width = self.inputs[self.entrance].width
+        self._told = TimedQueue()  # lists of what firings have told, for the next microstep
+        self._telling: list[tuple[OutputPort[Any], Any, int | None]] | None = None  # that of the present one
+        self._counts = dict.fromkeys(self.outputs, 0)  # the values sent last
+        self._entrance = self.inputs[self.entrance]
+        width = self._entrance.width
         self._answers = {name for name, output in self.outputs.items() if output.multi and output.width == width}
         self._came = 0
+
+    def fire(self) -> None:
+        self._telling = None
+        while self._told.is_due():
+            for output, token, channel in self._told.pop():
+                output.send(token, channel)
+        has_lost = self.patience is not None and self._renege()
+        if self._make_room() or self._entrance.present or has_lost:
+            self._join()
+            self._tell_counts()
+
+    # To be defined by a subclass.
+
+    def _make_room(self) -> bool:
+        """Take in what lets tokens go; returns whether there is anything."""
+        raise NotImplementedError
+
+    def _newcomer(self, token: Any, channel: int, now: float) -> Waiter:
+        """A token that comes in, with ``_waiter``."""
+        raise NotImplementedError
+
+    def _serve(self) -> None:
+        """Let the tokens go whose turn has come."""
+        raise NotImplementedError
+
+    def _tell_counts(self) -> None:
+        """Tell the counts that have changed, with ``_tell_count``."""
+        raise NotImplementedError
+
+    # For subclasses
 
     def _tell(self, port: str, token: Any, channel: int | None = None) -> None:
         """Send at the next microstep."""
         if self._telling is None:
             self._telling = []
-            self._told.put(self._telling, 0.0)
-        self._telling.append((port, token, channel))
+            self._told.push(self.context.wake(self, self.context.time), self._telling)
+        self._telling.append((self.outputs[port], token, channel))
 
     def _tell_of(self, port: str, waiter: Waiter) -> None:
         self._tell(port, waiter.token, waiter.channel if port in self._answers else None)
 
     def _tell_count(self, port: str, count: int) -> None:
-        if self._counts.get(port, 0) != count:
+        if self._counts[port] != count:
             self._counts[port] = count
             self._tell(port, count)
 
-    def _send(self) -> None:
-        """Send the pending outputs."""
-        self._telling = None
-        for told in self._told.due():
-            for port, token, channel in told:
-                self.outputs[port].send(token, channel)
+    def _waiter(self, token: Any, channel: int, now: float, size: float = 1.0, amounts: tuple[int, ...] = ()) -> Waiter:
+        number, self._came = self._came, self._came + 1
+        place = float(-number if self.discipline == LIFO else number)
+        if self.discipline == RANDOM:
+            place = self.random.random()
+        order = self.order.number("an order", token, now, channel)
+        return Waiter(token, channel, order, place, size, number, amounts)
+
+    # The course of a firing
 
     def _renege(self) -> bool:
         """Remove those whose patience has run out; returns whether there are any."""
-        if self.patience is None or not self._waiting:
-            return False
         over = [each for each in self._waiting if each.patience is not None and each.patience.due]
         for each in over:
             self._waiting.remove(each)
             self._tell_of("reneged", each)
         return bool(over)
 
-    def _waiter(self, token: Any, channel: int, size: float) -> Waiter:
-        number, self._came = self._came, self._came + 1
-        place = float(-number if self.discipline == LIFO else number)
-        if self.discipline == RANDOM:
-            place = self.random.random()
-        order = self.order.number("an order", token, self.now, channel)
-        return Waiter(token, channel, order, place, size, number)
-
-    def _join(self, newcomers: list[Waiter], serve: Callable[[], None]) -> None:
+    def _join(self) -> None:
         """Let new tokens wait; those that cannot be served at once may leave, or find no room."""
-        for each in newcomers:
-            self._waiting.add(each)
-        serve()
-        if not newcomers or not self._waiting:
+        newcomers: list[Waiter] = []
+        if self._entrance.present:
+            now = self.now
+            for channel, token in self._entrance.arrivals():
+                newcomers.append(self._newcomer(token, channel, now))
+                self._waiting.add(newcomers[-1])
+        self._serve()
+        if not newcomers or not self._waiting or (self.room is None and self.balking is None and self.patience is None):
             return
         new = [each for each in sorted(newcomers, key=_KEY) if each in self._waiting]
         old = len(self._waiting) - len(new)
@@ -200,7 +237,7 @@ class WaitingActor(Actor):
             if patience < math.inf:
                 each.patience = self.wake_in(patience)
         if stay < len(new):
-            serve()  # those behind one that has left
+            self._serve()  # those behind one that has left
 
     def _patience_of(self, waiter: Waiter) -> float:
         if self.patience is None:
