@@ -288,19 +288,17 @@ class Match(Actor):
 
     def fire(self) -> None:
         count = self._count.number
-        for channel, tokens in enumerate(self.input.by_channel()):
-            for token in tokens:
-                key = _hashable(None if self.key is None else self.key.call(token))
-                if key not in self._parts:
-                    self._parts[key] = [deque() for _ in range(self.input.width)]
-                parts = self._parts[key]
-                parts[channel].append(token)
-                count += 1
-                if all(parts):
-                    self.output.send([part.popleft() for part in parts])
-                    count -= len(parts)
-                    if not any(parts):
-                        del self._parts[key]
+        for channel, token in self.input.arrivals():
+            key = None if self.key is None else _hashable(self.key.call(token))
+            if (parts := self._parts.get(key)) is None:
+                parts = self._parts[key] = [deque() for _ in range(self.input.width)]
+            parts[channel].append(token)
+            count += 1
+            if all(parts):
+                self.output.send([part.popleft() for part in parts])
+                count -= len(parts)
+                if not any(parts):
+                    del self._parts[key]
         self._count.tell(count)
 
 

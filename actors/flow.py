@@ -44,7 +44,7 @@ class Merge(Actor):
 
     def fire(self) -> None:
         self._waiting.come()
-        first = next((queue for queue in self._waiting.channels if queue), None)
+        first = next(filter(None, self._waiting.channels), None)
         if first is None:
             return
         self.output.send(first.popleft())
@@ -117,10 +117,8 @@ class Router(Actor):
     def fire(self) -> None:
         if not self.output.width:
             return
-        if self.load.present:
-            for place, loads in enumerate(self.load.by_channel()):
-                if loads:
-                    self._loads[place] = loads[-1]
+        for place, load in self.load.arrivals():
+            self._loads[place] = load
         for token in self.input.tokens:
             self._next = self._chosen(token)
             self.output.send(token, self._next)
@@ -198,10 +196,9 @@ class BooleanSwitch(Actor):
 
     def fire(self) -> None:
         output = self.true_output if self.control else self.false_output
-        for channel, tokens in enumerate(self.input.by_channel()):
+        for channel, token in self.input.arrivals():
             if self.input.width == 1 or channel < output.width:
-                for token in tokens:
-                    output.send(token, None if self.input.width == 1 else channel)
+                output.send(token, None if self.input.width == 1 else channel)
 
 
 class Select(Actor):
@@ -299,9 +296,8 @@ class Sampler(ByChannel):
 
     def fire(self) -> None:
         if self.trigger.present:
-            for channel, tokens in enumerate(self.input.by_channel()):
-                for token in tokens:
-                    self.send(token, channel)
+            for channel, token in self.input.arrivals():
+                self.send(token, channel)
 
 
 class Holding(ByChannel):

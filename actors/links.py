@@ -70,10 +70,9 @@ class _Transmitting(Actor):
             self._transmitters[channel].is_busy = False
         return found
 
-    def _enqueue(self, token: Any, channel: int) -> bool:
+    def _enqueue(self, token: Any, channel: int, now: float) -> bool:
         """Let a frame wait for its channel; returns whether there is room for it."""
         transmitter = self._transmitters[channel]
-        now = self.now
         size = self.size.number("a size", token, now)
         if size < 0:
             raise EpicycleError(f"{self.size} gives {size:g} for {brief(token)}, but a size must be >= 0")
@@ -138,7 +137,7 @@ class Link(_Transmitting):
         for token in self.input.tokens:
             if self.rate is None:
                 self._travel(token)
-            elif not self._enqueue(token, 0):
+            elif not self._enqueue(token, 0, self.now):
                 self.rejected.send(token)
         self._begin(0)
         self._count.tell(self._waits)
@@ -178,10 +177,11 @@ class NetworkSwitch(_Transmitting):
             self.output.send(token, channel if width > 1 else None)
             free.append(channel)
         for token in self._looked_at.due():
-            channel = channel_of(token, self.port, self.output, self.now)
+            now = self.now
+            channel = channel_of(token, self.port, self.output, now)
             if self.rate is None:
                 self.output.send(token, channel if width > 1 else None)
-            elif self._enqueue(token, channel):
+            elif self._enqueue(token, channel, now):
                 free.append(channel)
             else:
                 self.rejected.send(token)
@@ -265,16 +265,23 @@ class ArqSender(Actor):
         self._count = Tally(self.waiting)
 
     def fire(self) -> None:
-        self._find_late()
+        late = [number for number, wake in self._late.items() if wake.due]
+        if late:
+            self._line_up(late)
+        if (self.tries is not None or self.lifetime is not None) and self._abandon():
+            self._open()
+            self._send()
+        elif late:
+            self._send()
         if self._wake is not None and self._wake.due:
             self._wake = None
             self._acknowledge()
             self._open()
             self._send()
-        for token in self.input.tokens:
-            self._queue.append(_Outgoing(token, None if self.lifetime is None else self.wake_in(self.lifetime)))
-        self._acks.extend(self.ack.tokens)
         if self.input.present or self.ack.present:
+            for token in self.input.tokens:
+                self._queue.append(_Outgoing(token, None if self.lifetime is None else self.wake_in(self.lifetime)))
+            self._acks.extend(self.ack.tokens)
             self._ask(self.context.time)
 
     def _ask(self, time: int) -> None:
@@ -284,24 +291,17 @@ class ArqSender(Actor):
                 self._wake.cancel()
             self._wake = self.context.wake(self, time)
 
-    def _find_late(self) -> None:
-        late = [number for number, wake in self._late.items() if wake.due] if self._late else []
+    def _line_up(self, late: list[int]) -> None:
+        """Send frames again: those that are late, or all."""
         for number in late:
             if self.repeat == "one" or number == self._oldest:
                 self._out[number].timeouts += 1
-        for number in list(self._late) if late and self.repeat == "all" else late:
+        for number in list(self._late) if self.repeat == "all" else late:
             self._late.pop(number).cancel()
             insort(self._ahead, number)
-        if self._abandon():
-            self._open()
-            self._send()
-        elif late:
-            self._send()
 
     def _abandon(self) -> bool:
         """Give up the tokens that have reached a limit; returns whether there are any."""
-        if self.tries is None and self.lifetime is None:
-            return False
         over = [number for number, each in self._out.items() if each.is_dead or each.timeouts == self.tries]
         for number in over:
             self.abandoned.send(self._taken_out(number))
@@ -345,8 +345,9 @@ class ArqSender(Actor):
 
     def _send(self) -> None:
         limit = {} if self.tries is None and self.lifetime is None else {"oldest": self._oldest}
-        while (self._ahead or not self._is_told) and self._free <= self.context.time:
-            self._free = self.context.time + to_nanoseconds(self.spacing)
+        now = self.context.time
+        while (self._ahead or not self._is_told) and self._free <= now:
+            self._free = now + to_nanoseconds(self.spacing)
             self._is_told = True
             if not self._ahead:
                 self.output.send(limit)

@@ -34,13 +34,12 @@ class Filter(ByChannel):
     )
 
     def fire(self) -> None:
-        for channel, tokens in enumerate(self.input.by_channel()):
-            for token in tokens:
-                passes = self.condition.call(token, self.now)
-                if not isinstance(passes, bool):
-                    raise EpicycleError(f"{self.condition} gives {passes!r} for {brief(token)}, expected true or false")
-                if passes:
-                    self.send(token, channel)
+        for channel, token in self.input.arrivals():
+            passes = self.condition.call(token, self.now)
+            if not isinstance(passes, bool):
+                raise EpicycleError(f"{self.condition} gives {passes!r} for {brief(token)}, expected true or false")
+            if passes:
+                self.send(token, channel)
 
 
 class Inhibit(ByChannel):
@@ -185,9 +184,8 @@ class BooleanSelect(Actor):
             self._control = self.control.value
         if self._control is not None:
             chosen = self.true_input if self._control else self.false_input
-            for channel, tokens in enumerate(chosen.by_channel()):
-                for token in tokens:
-                    self.output.send(token, None if chosen.width == 1 else channel)
+            for channel, token in chosen.arrivals():
+                self.output.send(token, None if chosen.width == 1 else channel)
 
 
 class Commutator(Actor):

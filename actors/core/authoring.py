@@ -42,10 +42,11 @@ class Queues:
 
     def come(self) -> None:
         """Let the tokens of the present tag wait."""
-        queues = iter(self.channels)
+        first = 0
         for port in self._ports:
-            for tokens in port.by_channel():
-                next(queues).extend(tokens)
+            for channel, token in port.arrivals():
+                self.channels[first + channel].append(token)
+            first += port.width
 
     def rounds(self) -> Iterator[list[Any]]:
         """Let them wait, and take one from each channel as long as all have one."""

@@ -249,11 +249,10 @@ class BroadcastChannel(Actor):
 
     def fire(self) -> None:
         send, listeners = self.output.send, range(self.output.width)
-        for speaker, tokens in enumerate(self.input.by_channel()):
-            for token in tokens:
-                for listener in listeners:
-                    if listener != speaker:
-                        send(token, listener)
+        for speaker, token in self.input.arrivals():
+            for listener in listeners:
+                if listener != speaker:
+                    send(token, listener)
 
 
 class Flooding(Actor):

@@ -15,7 +15,7 @@ from tests.engine.cores import ROOT
 SOURCES = (
     ("arithmetic.py", "Scale", "7f39ca54f30a01c2"),
     ("core/authoring.py", "Latest", "7b8df371609d0b11"),
-    ("core/authoring.py", "Pending", "61c060bf4bad1b00"),
+    ("core/authoring.py", "Pending", "2c2a047606f97709"),
     ("core/authoring.py", "rounds", "bcf677d00b681776"),
     ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),
     ("core/laws.py", "exponential", "dd3e701d840f2744"),

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator
-from typing import Protocol
+from typing import Any, Protocol
 
 from .property import Junction, Not, Property, Quantified, Until
 from .signal import Line, Piece, Value, at, by_sign, earlier, extreme, moment, negated, overlaid, time_of
@@ -189,8 +189,10 @@ class Window:
                 parts.append(piece.value.earlier(by))
             elif piece.value is not None:
                 parts.append(piece.value)
-        if not parts:
-            return [Piece(start, end, -math.inf if self._any else math.inf)]
+        if Line not in map(type, parts):
+            numbers: list[Any] = parts
+            value = max(numbers, default=-math.inf) if self._any else min(numbers, default=math.inf)
+            return [Piece(start, end, value)]
         found = [Piece(start, end, parts[0])]
         for part in parts[1:]:
             found = [

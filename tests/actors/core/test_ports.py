@@ -99,8 +99,9 @@ def test_what_an_input_holds() -> None:
         port.receive(token, channel)
     assert (port.present, port.tokens, port.value) == (True, (5, 6, 7), 7)
     assert port.by_channel() == [[6], [5, 7], []]
+    assert port.arrivals() == [(0, 6), (1, 5), (1, 7)]
     port.clear()
-    assert (port.present, port.tokens) == (False, ())
+    assert (port.present, port.tokens, port.arrivals()) == (False, (), [])
 
 
 def test_nothing_is_sent_outside_of_a_run() -> None:
