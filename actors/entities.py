@@ -303,6 +303,8 @@ class Match(Actor):
 
 
 def _hashable(key: Any) -> Hashable:
+    if isinstance(key, (int, float, str)):  # nearly always
+        return key
     if isinstance(key, list):
         return tuple(map(_hashable, key))
     if isinstance(key, Mapping):

@@ -80,6 +80,9 @@ class _Pools(WaitingActor):
         self._capacities = units
         for channel, token in self.release.arrivals():
             self._return(token, channel)
+        if self.preemptive:
+            excess = [used - there for used, there in zip(self._in_use, units, strict=True)]
+            self._take_back(self._last_of(self._held, excess)[0])
         return True
 
     def _newcomer(self, token: Any, channel: int, now: float) -> Waiter:
@@ -93,7 +96,6 @@ class _Pools(WaitingActor):
 
     def _return(self, token: Any, channel: int) -> None:
         wanted = None if self.key is None else self.key.call(token)
-
         for held in self._held:
             if self._is_meant(held, channel, wanted):
                 self._give_back(held)
@@ -117,27 +119,15 @@ class _Pools(WaitingActor):
             request.mark = (self.key.call(request.token),)
         return bool(request.mark[0] == wanted)
 
-    def _serve(self) -> None:
-        """Grant requests that have none ahead of them at any of their kinds while there are units."""
-        if self.preemptive:
-            excess = [used - there for used, there in zip(self._in_use, self._capacities, strict=True)]
-            self._take_back(self._last_of(self._held, excess)[0])
-        claimed: list[bool] = []  # kinds for which a request waits
-        place = 0
-        while place < len(self._waiting) and not (claimed and all(claimed)):
-            request = self._waiting[place]
-            if claimed and any(map(and_, claimed, map(bool, request.amounts))):
-                is_granted = False
-            else:
-                is_granted = self._are_free(request.amounts) or (self.preemptive and self._has_preempted_for(request))
-            if is_granted:
-                self._held.append(self._waiting.take(place))
-                self._in_use = list(map(add, self._in_use, request.amounts))
-                self._tell_of("granted", request)
-            else:
-                before = claimed or [False] * len(self._capacities)
-                claimed = [each or amount > 0 for each, amount in zip(before, request.amounts, strict=True)]
-                place += 1
+    def _grant(self, place: int) -> bool:
+        """Grant the request at a place of the line if there are units for it; whether it was."""
+        request = self._waiting[place]
+        if not (self._are_free(request.amounts) or (self.preemptive and self._has_preempted_for(request))):
+            return False
+        self._held.append(self._waiting.take(place))
+        self._in_use = list(map(add, self._in_use, request.amounts))
+        self._tell_of("granted", request)
+        return True
 
     def _are_free(self, amounts: tuple[int, ...]) -> bool:
         for amount, used, there in zip(amounts, self._in_use, self._capacities, strict=True):
@@ -213,6 +203,10 @@ class Pool(_Pools):
         known=("time", "channel"),
         doc="number of units requested: an expression over the token's fields, token, time, channel",
     )
+
+    def _serve(self) -> None:
+        while self._waiting and self._grant(0):
+            pass
 
     def _units(self) -> tuple[int, ...]:
         return (self.capacity,)
@@ -296,6 +290,16 @@ class Pools(_Pools):
                     raise EpicycleError(f"{port.path} got {units}, but a number of units must be >= 0")
                 self._present[name] = units
         super().fire()
+
+    def _serve(self) -> None:
+        """Grant requests that have none ahead of them at any of their pools while there are units."""
+        claimed = [False] * len(self._capacities)  # pools for which a request waits
+        place = 0
+        while place < len(self._waiting) and not all(claimed):
+            amounts = self._waiting[place].amounts
+            if any(map(and_, claimed, map(bool, amounts))) or not self._grant(place):
+                claimed = [each or amount > 0 for each, amount in zip(claimed, amounts, strict=True)]
+                place += 1
 
     def _units(self) -> tuple[int, ...]:
         return tuple(self._present.values())
