@@ -76,7 +76,7 @@ class _Throughout:
     def _add(self, start: int, end: int, value: float | Line) -> None:
         both = (self._extreme, at(value, start), at(value, end))
         self._extreme = max(both) if self._any else min(both)
-        if self._moment is None:
+        if self._moment is None and (isinstance(value, Line) or (value > 0.0) == self._any):
             deciding = (each.start for each in by_sign(start, end, value) if (at(value, each.start) > 0.0) == self._any)
             self._moment = next(deciding, None)
 
