@@ -275,9 +275,7 @@ def _broken(model: str, verdicts: Mapping[str, Verdict]) -> list[str]:
     states = []
     for name, verdict in verdicts.items():
         reason = f" ({verdict.missing})" if verdict.missing else ""
-        states.append(
-            f"monitor {name} {'holds' if verdict.holds else 'cannot be judged'} in this run of {model}{reason}"
-        )
+        states.append(f"monitor {name} {verdict.said} in this run of {model}{reason}")
     raise EpicycleError(f"{' and '.join(states)}: there is nothing to explain")
 
 

@@ -22,7 +22,6 @@ from epicycle.aspects import ClockAspect, ExecutionAspect, JoinPoint, PortAspect
 
 from ..desk import difference
 from ..execution.engine import Interventions, Simulation
-from ..execution.results import Verdict
 from ..execution.results import plain as plain_value
 from ..model.build.model import Model
 from ..model.graph.acts import Act
@@ -317,10 +316,11 @@ class WhatIf(Answer):
         assert before is not None
         assert after is not None
         self.before, self.after = before, after
-        self.first = differing.first_firing(page.recordings)
+        changed = differing.changed(page.recordings)
+        self.first = changed[0] if changed else None
         record = differing.difference(page.recordings)
         self.record: list[str] = [] if record is None else record["texts"]
-        self.affected = {actor: tag.seconds for actor, tag in differing.affected(page.recordings).items()}
+        self.affected = {each.actor: each.time for each in changed}
         self.error = str(page.errors[0]) if page.errors else ""
         self._actors = len(model.graph.actors)
 
@@ -342,14 +342,12 @@ class WhatIf(Answer):
             return [*said, f"{reason}."]
         if self.first is not None:
             said.append(f"The first firing that changes is {self.first.actor} at {self.first.tag}.")
-        names = [*self.affected][:_FEW]
-        more = f" and {len(self.affected) - _FEW:,} more" if len(self.affected) > _FEW else ""
-        whom = f": {', '.join(names)}{more}" if names else ""
+        whom = f": {listed([*self.affected], most=_FEW)}" if self.affected else ""
         do = "does" if len(self.affected) == 1 else "do"
         said.append(f"{len(self.affected):,} of {counted(self._actors, 'actor')} {do} something else{whom}.")
         for name, verdict in self.before.monitors.items():
             if (other := self.after.monitors[name]).holds != verdict.holds:
-                said.append(f"Monitor {name}: {_verdict(verdict)} as it was, {_verdict(other)} instead.")
+                said.append(f"Monitor {name}: {verdict.said} as it was, {other.said} instead.")
         if self.error:
             said.append(f"The other future ends in an error: {self.error}")
         return said
@@ -391,9 +389,7 @@ class WhatIf(Answer):
             (name, each.shown(short), self.after.outcomes[name].shown(short), units.get(name, ""))
             for name, each in self.before.outcomes.items()
         ]
-        verdicts = [
-            (name, _verdict(each), _verdict(self.after.monitors[name])) for name, each in self.before.monitors.items()
-        ]
+        verdicts = [(name, each.said, self.after.monitors[name].said) for name, each in self.before.monitors.items()]
         rows = [("first difference", *self.record)] if self.record else []
         if self.first is not None:
             rows.insert(0, (f"{self.first.actor} at {self.first.tag}", *self.first.does))
@@ -402,11 +398,3 @@ class WhatIf(Answer):
             Table(("metric", AS_IT_WAS, INSTEAD, "unit"), metrics),
             Table(("monitor", AS_IT_WAS, INSTEAD), verdicts),
         ]
-
-
-def _verdict(verdict: Verdict) -> str:
-    if verdict.holds is None:
-        return "cannot be judged"
-    if verdict.holds:
-        return "holds"
-    return "broken" if verdict.time is None else f"broken at {verdict.time:.9g} s"

@@ -30,6 +30,13 @@ class Verdict:
     broken_by: tuple[str, ...] = ()
 
     @property
+    def said(self) -> str:
+        """Whether the property holds, in words."""
+        if self.holds is not False:
+            return "holds" if self.holds else "cannot be judged"
+        return "broken" if self.time is None else f"broken at {self.time:.9g} s"
+
+    @property
     def remark(self) -> str:
         """What people should know of it."""
         if self.holds is not False or (self.time is None and not self.broken_by):

@@ -4,29 +4,30 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import takewhile, zip_longest
+from dataclasses import dataclass, field
+from itertools import zip_longest
 from typing import Any
 
-from epicycle.actors import Tag, shortened
+from epicycle.actors import NEVER, Tag, shortened
 
 from ...support.shown import in_words
 from .recording import NOTHING, Kept, Recording
 
 _WIDEST, _NARROW = 80, 40  # characters of a token, and of one of several
+_NEVER = Tag(NEVER, 0)
 
 
 @dataclass(frozen=True)
 class First:
-    """The first firing that is not the same in two runs, or that only one of them has; in words, what it does in each.
+    """The first firing of an actor that is not the same in two runs, or that only one of them has.
 
     ``numbers`` are those that it has in each, None where it is missing.
     """
 
     actor: str
     at: Tag
-    numbers: tuple[int | None, int | None]
-    does: tuple[str, ...]
+    numbers: tuple[int | None, ...]
+    recordings: Sequence[Recording] = field(repr=False, compare=False)
 
     @property
     def time(self) -> float:
@@ -36,12 +37,18 @@ class First:
     def tag(self) -> str:
         return f"({self.time:.9g} s, {self.at.microstep})"
 
+    @property
+    def does(self) -> tuple[str, ...]:
+        """What it does in each run, in words."""
+        both = zip(self.recordings, self.numbers, strict=True)
+        return tuple("does not fire" if n is None else _took(recording, n) for recording, n in both)
+
 
 def difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
     """The first record in which the logs differ, and the first firing: numbers among the kept ones, and words."""
     if (record := _first(*(each.hashes for each in recordings[:2]))) is None:
         return None
-    first = first_firing(recordings)
+    first = next(iter(changed(recordings)), None)
     numbers = [NOTHING if n is None else n for n in ((None, None) if first is None else first.numbers)]
     return {
         "records": [each.among_kept("record", [record])[0] for each in recordings],
@@ -51,47 +58,19 @@ def difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
     }
 
 
-def first_firing(recordings: Sequence[Recording]) -> First | None:
-    """The first firing that took or sent something else, or that only one of the runs has."""
-    one, other = (each.fired for each in recordings[:2])
-    number = _first(one.hashes, other.hashes)
-    if number is None:
-        return None
-    heads = {n: _head(each, number) for n, each in enumerate(recordings[:2]) if number < len(each.fired)}
-    # If only one of them has it: the one that comes first, or that the other run does not have at this tag.
-    which = min(heads, key=lambda n: (heads[n][0], _comes(recordings[1 - n], number, heads[n])))
-    tag, actor = heads[which]
-    numbers = [number if heads.get(n) == heads[which] else None for n in (0, 1)]
-    does = [
-        "does not fire" if n is None else _took(recording, n) for recording, n in zip(recordings, numbers, strict=False)
-    ]
-    return First(actor, tag, (numbers[0], numbers[1]), tuple(does))
-
-
-def _head(recording: Recording, number: int) -> tuple[Tag, str]:
-    fired = recording.fired
-    return fired.tag(number), list(recording.places)[fired.actors[number]]
-
-
-def _comes(recording: Recording, number: int, head: tuple[Tag, str]) -> bool:
-    """Whether a run has a firing of this actor at this tag, from a number on."""
-    (tag, path), fired = head, recording.fired
-    actor = recording.places.get(path)
-    until_then = takewhile(lambda n: fired.tag(n) <= tag, range(number, len(fired)))
-    return any(fired.actors[n] == actor and fired.tag(n) == tag for n in until_then)
-
-
-def affected(recordings: Sequence[Recording]) -> dict[str, Tag]:
-    """The actors whose firings are not the same in both runs, with the tag of the first one, in that order."""
-    found: dict[str, Tag] = {}
-    both = [_by_actor(each) for each in recordings[:2]]
-    for actor in {**both[0], **both[1]}:
-        for numbers in zip_longest(*(each.get(actor, ()) for each in both)):
-            here = [(each.fired, n) for each, n in zip(recordings, numbers, strict=True) if n is not None]
-            if len(here) == 1 or here[0][0].hashes[here[0][1]] != here[1][0].hashes[here[1][1]]:
-                found[actor] = min(fired.tag(n) for fired, n in here)
-                break
-    return dict(sorted(found.items(), key=lambda each: (each[1], each[0])))
+def changed(recordings: Sequence[Recording]) -> list[First]:
+    """The first firing of each actor that took or sent something else, or that only one of the runs has, in order."""
+    both, found = recordings[:2], []
+    own = [_by_actor(each) for each in both]
+    for actor in dict.fromkeys([*own[0], *own[1]]):
+        runs = [(each.fired, firings.get(actor, [])) for each, firings in zip(both, own, strict=True)]
+        place = _first(*([fired.hashes[n] for n in firings] for fired, firings in runs))
+        if place is not None:
+            tags = [fired.tag(firings[place]) if place < len(firings) else _NEVER for fired, firings in runs]
+            at = min(tags)
+            numbers = [firings[place] if tag == at else None for (_, firings), tag in zip(runs, tags, strict=True)]
+            found.append(First(actor, at, tuple(numbers), both))
+    return sorted(found, key=lambda each: (each.at, min(n for n in each.numbers if n is not None)))
 
 
 def _by_actor(recording: Recording) -> dict[str, list[int]]:
