@@ -50,7 +50,7 @@ class UnwantedError(EpicycleError):
     """Nobody waits for the result any longer."""
 
 
-def _always(*_: object) -> bool:
+def always(*_: object) -> bool:
     return True
 
 
@@ -81,7 +81,7 @@ class Process:
     def is_over(self) -> bool:
         return self._process.poll() is not None
 
-    def begin(self, limit: float | None = None, is_wanted: Callable[[], bool] = _always) -> Outcome:
+    def begin(self, limit: float | None = None, is_wanted: Callable[[], bool] = always) -> Outcome:
         """Wait until the object is there; raises as ``call``."""
         outcome: Outcome = DONE, None
         if not self.has_started and (outcome := self._answer(limit, is_wanted))[0] == DONE:
@@ -95,8 +95,8 @@ class Process:
         method: str,
         *given: object,
         limit: float | None = None,
-        is_wanted: Callable[[], bool] = _always,
-        told: Callable[[Any], object] = _always,
+        is_wanted: Callable[[], bool] = always,
+        told: Callable[[Any], object] = always,
     ) -> Outcome:
         """The outcome of a call, in at most ``limit`` s; what the object says before it is ``told``.
 
@@ -110,7 +110,7 @@ class Process:
         self._give(())
 
     def _answer(
-        self, limit: float | None, is_wanted: Callable[[], bool], told: Callable[[Any], object] = _always
+        self, limit: float | None, is_wanted: Callable[[], bool], told: Callable[[Any], object] = always
     ) -> Outcome:
         since = time.monotonic()
         while True:
@@ -205,6 +205,20 @@ _replies: list[BinaryIO] = []  # where it answers, once it serves
 def say(message: object) -> None:
     """Report something to the one who waits for the outcome of a call, before it."""
     _reply(pickle.dumps((_SAID, message)))
+
+
+def bound(memory: int, file: int | None = None) -> None:
+    """Let this process take only so much memory, and write no larger files (bytes), where the system sees to that.
+
+    What is too large then fails here, not on the whole machine.
+    """
+    with suppress(ImportError, OSError, ValueError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+        if file is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (file, file))
 
 
 def is_hastened() -> bool:

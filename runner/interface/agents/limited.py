@@ -8,7 +8,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from epicycle.actors import FOLDERS
@@ -16,30 +15,28 @@ from epicycle.actors import FOLDERS
 from ...model.catalogue.packaged import model_folders
 
 _TEXT = "model.yaml"  # the name in messages of a model that came as a text
+_MEMORY, _FILE = 4 << 30, 64 << 20  # bytes that a command may take, and that a file of it may have
+_ARGUMENTS, _ANSWER = 100_000, 400_000  # characters
+_PROGRAM = (
+    f"from epicycle.runner.support.apart import bound; bound({_MEMORY}, {_FILE})\n"
+    "from runpy import run_module; run_module('epicycle', run_name='__main__')"
+)
 
 
 class ToolError(Exception):
     """The message that an agent gets instead of a result."""
 
 
-@dataclass(frozen=True)
-class Limits:
-    """How long a command may take (s), and how large its memory, a file, its arguments and an answer may be (bytes)."""
-
-    seconds: float = 60.0
-    memory: int = 4 << 30
-    file: int = 64 << 20
-    argument: int = 100_000
-    answer: int = 400_000
-
-
 class LimitedCall:
-    """Runs commands in ``folder``; ``types`` are the files of types that the one who started the server has named."""
+    """Runs commands in ``folder``, each for so many ``seconds`` at most.
 
-    def __init__(self, folder: Path, types: Sequence[str] = (), limits: Limits | None = None) -> None:
+    ``types`` are the files of types that the one who started the server has named.
+    """
+
+    def __init__(self, folder: Path, types: Sequence[str | Path] = (), seconds: float = 60.0) -> None:
         self.folder = folder.resolve()
-        self.types = [f"--types={Path(each).resolve()}" for each in types]
-        self.limits = limits or Limits()
+        self.types = [Path(each).resolve() for each in types]
+        self.seconds = seconds
 
     def call(
         self, command: str, names: Sequence[str], *options: str, good: Sequence[int] = (0,), file: str = ""
@@ -49,25 +46,25 @@ class LimitedCall:
             named = [self._named(each, out, number) for number, each in enumerate(names)]
             asked = [each.replace("{out}", f"{out}/found") for each in options]
             asked.append(f"-o={out}/{file}" if file else "--json")
-            words = [sys.executable, "-P", "-m", "epicycle", command, *asked, *self.types, "--", *named]
-            if sum(map(len, words)) > self.limits.argument or not all(map(_is_text, words)):
-                raise ToolError(f"the arguments have more than {self.limits.argument:,} characters, or are no text")
+            asked += [f"--types={each}" for each in self.types]
+            words = [sys.executable, "-P", "-c", _PROGRAM, command, *asked, "--", *named]
+            if sum(map(len, words)) > _ARGUMENTS or not all(map(_is_text, words)):
+                raise ToolError(f"the arguments have more than {_ARGUMENTS:,} characters, or are no text")
             code, told, complained = self._run(words, out)
             if code not in good or not told:
-                raise ToolError((complained or told)[: self.limits.answer] or f"the command ended with {code}")
+                raise ToolError((complained or told)[:_ANSWER] or f"the command ended with {code}")
             if file:
                 return Path(out, file).read_bytes()
-        if len(told) > self.limits.answer:
+        if len(told) > _ANSWER:
             raise ToolError(
-                f"the answer has {len(told):,} characters, more than {self.limits.answer:,}: "
-                "ask for less, or of a smaller model"
+                f"the answer has {len(told):,} characters, more than {_ANSWER:,}: ask for less, or of a smaller model"
             )
         return told.encode()
 
     def _named(self, name: str, out: str, number: int) -> str:
         """A model as the command line names it: a packaged one or type, a file in the folder, or a text."""
-        if len(name) > self.limits.argument:
-            raise ToolError(f"a model may have {self.limits.argument:,} characters, and this one has {len(name):,}")
+        if len(name) > _ARGUMENTS:
+            raise ToolError(f"a model may have {_ARGUMENTS:,} characters, and this one has {len(name):,}")
         if "\n" in name:
             path = Path(out, f"{number or ''}{_TEXT}")
             path.write_text(name, encoding="utf-8", errors="replace")
@@ -90,48 +87,30 @@ class LimitedCall:
     def _run(self, words: Sequence[str], out: str) -> tuple[int, str, str]:
         """The exit code of a command, and what it told and complained of."""
         streams = Path(out, ".stdout"), Path(out, ".stderr")
-        readable: list[str | Path] = [
-            self.folder,
-            out,
-            *model_folders(),
-            *(each.partition("=")[2] for each in self.types),
-        ]
-        folders = os.pathsep.join(str(Path(each).resolve()) for each in readable)
+        readable = [str(each.resolve()) for each in (self.folder, Path(out), *model_folders(), *self.types)]
         with streams[0].open("wb") as told, streams[1].open("wb") as complained:
-            process = subprocess.Popen(
-                words,
-                cwd=self.folder,
-                stdin=subprocess.DEVNULL,
-                stdout=told,
-                stderr=complained,
-                env={**os.environ, FOLDERS: folders, "NO_COLOR": "1", "COLUMNS": "120"},
-                start_new_session=True,
-            )
-            self._bound(process.pid)
             try:
-                code = process.wait(self.limits.seconds)
+                code = subprocess.run(
+                    words,
+                    cwd=self.folder,
+                    stdin=subprocess.DEVNULL,
+                    stdout=told,
+                    stderr=complained,
+                    env={**os.environ, FOLDERS: os.pathsep.join(readable), "NO_COLOR": "1", "COLUMNS": "120"},
+                    timeout=self.seconds,
+                    check=False,
+                    start_new_session=True,
+                ).returncode
             except subprocess.TimeoutExpired:
                 raise ToolError(
-                    f"it was ended after {self.limits.seconds:g} s: give an earlier 'until', fewer runs or a smaller "
-                    "model"
+                    f"it was ended after {self.seconds:g} s: give an earlier 'until', fewer runs or a smaller model"
                 ) from None
-            finally:
-                if process.poll() is None:
-                    os.killpg(process.pid, signal.SIGKILL)
-                    process.wait()
         if code < 0:
             raise ToolError(
                 f"it was ended by {signal.Signals(-code).name}: it may have needed too much memory or output"
             )
         said, wrong = (each.read_text("utf-8", errors="replace").replace(f"{out}/", "").strip() for each in streams)
         return code, said, wrong
-
-    def _bound(self, process: int) -> None:
-        if sys.platform == "linux":
-            import resource
-
-            for what, most in ((resource.RLIMIT_AS, self.limits.memory), (resource.RLIMIT_FSIZE, self.limits.file)):
-                resource.prlimit(process, what, (most, most))
 
 
 def _is_text(word: str) -> bool:

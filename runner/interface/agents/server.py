@@ -24,12 +24,11 @@ _FOLDER = "--out={out}"  # of the call, which goes with it
 
 
 class Tool(NamedTuple):
-    """A command, the options that an assistant may give it, and those that it always gets; ``good`` are exit codes."""
+    """A command, the options that an assistant may give it, and those that it gets before; ``good`` are exit codes."""
 
     command: str
     options: str = "set disturb aspect without"
-    always: tuple[str, ...] = ()
-    unless_given: Mapping[str, str] = {}
+    first: tuple[str, ...] = ()
     good: tuple[int, ...] = (0,)
     picture: str = ""  # its name, where the answer is one
 
@@ -40,10 +39,10 @@ TOOLS = {
     "validate": Tool("validate", good=(0, 2)),
     "describe": Tool("describe"),
     "list": Tool("list", ""),
-    "run": Tool("run", f"{_RUN} max_tags", unless_given={"max_tags": "200000"}),
+    "run": Tool("run", f"{_RUN} max_tags", ("--max-tags=200000",)),
     "compare": Tool("compare", f"{_RUN} vary replications", ("--jobs=1", _FOLDER)),
     "search": Tool(
-        "search", f"{_RUN} break vary runs max_faults", ("--jobs=1", _FOLDER), {"break": "", "runs": "100"}, (0, 1, 3)
+        "search", f"{_RUN} break vary runs max_faults", ("--jobs=1", _FOLDER, "--break=", "--runs=100"), (0, 1, 3)
     ),
     "explain": Tool("explain", f"{_RUN} monitor runs", ("--jobs=1", "--no-page", _FOLDER)),
     "diff": Tool("diff", good=(0, 1)),
@@ -62,16 +61,16 @@ class Offered:
 
     def described(self) -> mcp.Tool:
         properties = {name: _schema(each) for name, each in self.known.items()}
-        required = [name for name, each in self.known.items() if each.required and name not in self.tool.unless_given]
+        required = [name for name, each in self.known.items() if each.required]
         schema = {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
         return mcp.Tool(name=self.name, description=self.said, input_schema=schema)
 
     def words(self, call: LimitedCall, given: Mapping[str, Any]) -> tuple[list[str], list[str]]:
         """The models, or other names, and the options; raises ``ToolError``."""
-        names, options = list[str](), list(self.tool.always)
+        names, options = list[str](), list(self.tool.first)
         if missing := [name for name in self.described().input_schema["required"] if name not in given]:
             raise ToolError(f"{self.name} needs {', '.join(missing)}")
-        for name, value in {**self.tool.unless_given, **given}.items():
+        for name, value in given.items():
             if (action := self.known.get(name)) is None:
                 raise ToolError(f"{self.name} takes no {name!r}: it takes {', '.join(self.known)}")
             for each in _texts(name, value):

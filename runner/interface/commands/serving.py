@@ -6,6 +6,7 @@ import argparse
 import webbrowser
 from pathlib import Path
 
+from ...support.declare.parameters import COUNT, positive_seconds
 from ...support.extras import needed
 from ...support.printing import tell
 from .options import DONE, TYPES, command, option, own_types
@@ -34,8 +35,8 @@ def lsp(options: argparse.Namespace) -> int:
     option("model", metavar="MODEL.yaml", type=Path, help="the model's file; a new one is written when you save"),
     TYPES,
     option("--port", type=int, default=0, metavar="N", help="port on this machine (default: any that is free)"),
-    option("--seconds", type=float, default=60.0, metavar="S", help="longest time of a run (default: 60)"),
-    option("--events", type=int, default=2_000_000, metavar="N", help="most events of a run (default: 2,000,000)"),
+    option("--seconds", type=positive_seconds, default=60.0, metavar="S", help="longest time of a run (default: 60)"),
+    option("--events", type=COUNT, default=2_000_000, metavar="N", help="most events of a run (default: 2,000,000)"),
     option("--no-browser", action="store_true", help="print the address only"),
     imports=("model.build",),
 )
@@ -53,8 +54,6 @@ def studio(options: argparse.Namespace) -> int:
         raise EpicycleError(f"{path} is no file of a model: its name ends with .yaml")
     if not path.resolve().parent.is_dir():
         raise EpicycleError(f"there is no folder {path.parent}")
-    if options.seconds <= 0 or options.events <= 0:
-        raise EpicycleError("a run has more than 0 seconds and events")
     own_types(options)  # what is wrong with them is said here
     server = needed("epicycle.runner.interface.studio.server", "'epicycle studio'", "studio")
 
@@ -71,7 +70,7 @@ def studio(options: argparse.Namespace) -> int:
 @command(
     "serve an assistant: tools to check, run, compare and explain models, over standard input and output",
     option("folder", metavar="FOLDER", type=Path, help="the only folder whose files are read"),
-    option("--seconds", metavar="S", type=float, default=60.0, help="limit for each call (default: 60)"),
+    option("--seconds", metavar="S", type=positive_seconds, default=60.0, help="limit for each call (default: 60)"),
     TYPES,
     imports=(),
 )
@@ -88,12 +87,10 @@ def mcp(options: argparse.Namespace) -> int:
 
     if not options.folder.is_dir():
         raise EpicycleError(f"there is no folder {options.folder}")
-    if not 0 < options.seconds <= 3600:
-        raise EpicycleError(f"--seconds {options.seconds:g}: expected a number of seconds from 0 to 3600")
     server = needed("epicycle.runner.interface.agents.server", "'epicycle mcp'", "agents")
-    from ..agents import LimitedCall, Limits
+    from ..agents import LimitedCall
 
-    call = LimitedCall(options.folder, getattr(options, "types", ()), Limits(seconds=options.seconds))
+    call = LimitedCall(options.folder, getattr(options, "types", ()), options.seconds)
     server.make_server(call, version_of("epicycle") or "", _parsers()).run()
     return DONE
 

@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from ...support.apart import DONE, Outcome, Process, UnwantedError, WorkerError
+from ...support.apart import DONE, Outcome, Process, UnwantedError, WorkerError, always
 
 MAX_STILLBORN = 5  # processes in a row that end before they start work
 
@@ -45,9 +45,15 @@ class Processes:
             self._give_back(process, is_good=True)
 
     def make(
-        self, request: object, timeout: float | None = None, is_wanted: Callable[[], bool] = lambda: True
+        self,
+        request: object,
+        timeout: float | None = None,
+        is_wanted: Callable[[], bool] = always,
+        told: Callable[[Any], object] = always,
     ) -> Outcome:
         """The outcome of a request in one of the processes, in at most ``timeout`` seconds from its start.
+
+        What the worker says before it is ``told``.
 
         Raises ``WorkerError``, what the worker has raised, and ``UnwantedError`` if it is no longer wanted.
         """
@@ -56,18 +62,24 @@ class Processes:
             process = self._taken()
             is_good = False
             try:
-                what, told = process.begin(is_wanted=is_wanted)
+                what, answer = process.begin(is_wanted=is_wanted)
                 for method in ("prepare", "make") if what == DONE else ():
-                    what, told = process.call(method, request, limit=timeout, is_wanted=is_wanted)
+                    what, answer = process.call(method, request, limit=timeout, is_wanted=is_wanted, told=told)
                     if what != DONE:
                         break
                 is_good = what == DONE
             finally:
                 self._give_back(process, is_good)
             if process.is_ready:
-                return what, told
-            code = told
+                return what, answer
+            code = answer
         raise WorkerError(f"{MAX_STILLBORN} processes in a row ended before they could start (exit code {code})")
+
+    def hasten(self) -> None:
+        """Let those come to their end that look whether something waits."""
+        with self._guard:
+            for each in self._all:
+                each.hasten()
 
     def end(self) -> None:
         """End all, even in the middle of their work."""
