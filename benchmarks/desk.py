@@ -46,7 +46,7 @@ def edited(text: str, count: int) -> Iterator[str]:
             case 3:
                 yield text.replace("  clock: {", f"  half{number}: {{\n  clock: {{", 1)
             case _:
-                yield editing.add_part(text, "", "actors", f"new{number}", "Clock", {"period": "1 s"})
+                yield editing.change(text, "add_part", "", "actors", f"new{number}", "Clock", {"period": "1 s"})
 
 
 def latencies(path: Path, text: str, edits: int) -> list[float]:
@@ -59,7 +59,7 @@ def latencies(path: Path, text: str, edits: int) -> list[float]:
     with seldom_collecting():
         for each in texts:
             began = time.process_time()
-            answer: dict[str, Any] = worker.answer({"ask": "read", "text": each})
+            answer: dict[str, Any] = worker.make({"ask": "read", "text": each})
             said.append(json.dumps(answer))
             found.append(time.process_time() - began)
             assert "graph" in answer, answer

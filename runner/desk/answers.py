@@ -38,7 +38,6 @@ _LOOKS = {
     "value": (_ITEM.EnumMember, _SYMBOL.Field, ""),
     "unit": (_ITEM.Unit, _SYMBOL.Field, ""),
     "function": (_ITEM.Function, _SYMBOL.Field, ""),
-    "file": (_ITEM.File, _SYMBOL.Field, ""),
 }
 LEGEND = lsp.SemanticTokensLegend([token for *_, token in _LOOKS.values() if token], [])
 
@@ -126,11 +125,12 @@ class Answers:
 
     # -- problems -------------------------------------------------------------------------------------------------
 
-    def problems(self, known: Knowledge) -> Iterator[tuple[lsp.Diagnostic, changes.Edit | None]]:
-        """The problems of a text, with what removes them; those in other files stand at its beginning, with a link."""
-        return ((self._diagnostic(known, each), changes.fix(known, each)) for each in known.reading.problems)
+    def problems(self, known: Knowledge) -> list[lsp.Diagnostic]:
+        """The problems of a text; those in other files stand at its beginning, with a link."""
+        return [self._diagnostic(known, each) for each in known.reading.problems]
 
     def _diagnostic(self, known: Knowledge, problem: Problem) -> lsp.Diagnostic:
+        """A problem, with the change of this text that removes it, if there is one, as its data."""
         at, message = problem.position, "\n".join([problem.message, *(f"help: {each}" for each in problem.help)])
         found = lsp.Diagnostic(self._range("", 0, 0), message, _SEVERITY[problem.severity], problem.kind.code)
         found.source = "epicycle"
@@ -140,18 +140,21 @@ class Answers:
             found.message = f"{at}: {message}"
             [location] = self.locations(known, [at])
             found.related_information = [lsp.DiagnosticRelatedInformation(location, problem.message)]
+        if (edit := changes.fix(known, problem)) is not None and edit.path.resolve() == known.path:
+            found.data = self.text_edit(known, edit)
         return found
 
     def actions(self, known: Knowledge, params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
         """Fixes of the problems in a range, and of all problems."""
         found, wanted = [], params.range
-        for problem, edit in self.problems(known):
+        for problem in self.problems(known):
+            edit: Any = problem.data
             if edit is None or problem.range.start > wanted.end or wanted.start > problem.range.end:
                 continue
-            shown = edit.text.strip().removeprefix(", ")
-            title = f"add {shown!r}" if edit.start == edit.end else f"write {shown!r}"
+            shown = edit.new_text.strip().removeprefix(", ")
+            title = f"add {shown!r}" if edit.range.start == edit.range.end else f"write {shown!r}"
             action = lsp.CodeAction(title, lsp.CodeActionKind.QuickFix, [problem], is_preferred=True)
-            action.edit = self.workspace_edit(known, [edit])
+            action.edit = lsp.WorkspaceEdit({uri_of(known.path): [edit]})
             found.append(action)
         if edits := changes.fix_all(known):
             everything = lsp.CodeAction("fix all problems that have one certain fix", FIX_ALL)

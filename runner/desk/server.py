@@ -58,7 +58,7 @@ class Server(LanguageServer):
     def _tell(self, path: Path) -> None:
         found = list[lsp.Diagnostic]()
         if path in self.ours and path in self.answers.texts:
-            found = [each for each, _ in self.answers.problems(self.answers.knowledge(path))]
+            found = self.answers.problems(self.answers.knowledge(path))
         params = lsp.PublishDiagnosticsParams(uri_of(path), found, self.versions.get(path))
         self.text_document_publish_diagnostics(params)
 

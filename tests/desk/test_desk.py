@@ -228,7 +228,7 @@ def test_hover(tmp_path: Path) -> None:
         "A body on a circle of radius `speed / turn_rate` (Table III), computed from the time alone"
     )
     assert said('"${lo', 'ss}"') == (
-        "**loss**: parameter = `0.2` (line 3)\n\nmin 0, max 1\n\nprobability that a tick is lost\n\n"
+        "**loss**: parameter = `0.2` (line 3)\n\n>= 0 and <= 1\n\nprobability that a tick is lost\n\n"
         "Probability that a message is lost (number)"
     )
     assert "value of `clock`: `0.5` s" in said("per", "iod: 500 ms")

@@ -95,35 +95,28 @@ def lines(before: str, after: str) -> tuple[list[str], list[str]]:
 CASES: dict[str, tuple[str, Act, list[str], list[str], list[str]]] = {
     "connect": (
         TEXT,
-        lambda text: editing.connect(text, "", "clock.output", "left.trigger"),
+        lambda text: editing.change(text, "connect", "", "clock.output", "left.trigger"),
         [],
         ["- clock.output -> left.trigger\n"],
         [],
     ),
-    "connect with a delay": (
-        TEXT,
-        lambda text: editing.connect(text, "", "clock.output", "left.trigger", "1 s"),
-        [],
-        ["- {from: clock.output, to: left.trigger, delay: 1 s}\n"],
-        ["~ clock.output -> left.trigger.delay: none -> none, 1 s"],
-    ),
     "disconnect": (
         TEXT,
-        lambda text: editing.disconnect(text, "", "clock.output", "left.trigger"),
+        lambda text: editing.change(text, "disconnect", "", "clock.output", "left.trigger"),
         ["- clock.output -> left.trigger   # at once\n"],
         [],
         ["- clock.output -> left.trigger"],
     ),
     "disconnect a mapping": (
         TEXT,
-        lambda text: editing.disconnect(text, "", "clock.output", "right.trigger"),
+        lambda text: editing.change(text, "disconnect", "", "clock.output", "right.trigger"),
         ["- {from: clock.output, to: right.trigger, delay: 100 ms}\n"],
         [],
         ["- clock.output -> right.trigger: delay 0.1 s"],
     ),
     "add an actor": (
         TEXT,
-        lambda text: editing.add_part(text, "", "actors", "more", "Merge", {}),
+        lambda text: editing.change(text, "add_part", "", "actors", "more", "Merge", {}),
         [],
         ["  more: {type: Merge}\n"],
         [
@@ -132,7 +125,7 @@ CASES: dict[str, tuple[str, Act, list[str], list[str], list[str]]] = {
     ),
     "remove an actor": (
         TEXT,
-        lambda text: editing.remove(set_value(text, ("run", "record"), "left.state"), "", "actors", "right"),
+        lambda text: editing.change(set_value(text, ("run", "record"), "left.state"), "remove", "", "actors", "right"),
         [
             "  right:\n",
             "    type: CircularMotion\n",
@@ -145,92 +138,94 @@ CASES: dict[str, tuple[str, Act, list[str], list[str], list[str]]] = {
     ),
     "set a parameter": (
         TEXT,
-        lambda text: editing.set_parameter(text, "", "actors", "right", "start", "[1, 2]"),
+        lambda text: editing.change(text, "set_parameter", "", "actors", "right", "start", "[1, 2]"),
         ["    start: [0, -1]   # below\n"],
         ["    start: [1, 2]   # below\n"],
         ["~ right.start: [0, -1] -> [1, 2]"],
     ),
     "set a parameter that has its default": (
         TEXT,
-        lambda text: editing.set_parameter(text, "", "actors", "right", "speed", "3 m/s"),
+        lambda text: editing.change(text, "set_parameter", "", "actors", "right", "speed", "3 m/s"),
         [],
         ["    speed: 3 m/s\n"],
         ["~ right.speed: 1.26 -> 3"],
     ),
     "set a parameter of the model": (
         TEXT,
-        lambda text: editing.set_parameter(text, "", "parameters", "loss", "", "0.5"),
+        lambda text: editing.change(text, "set_parameter", "", "parameters", "loss", "", "0.5"),
         ["  loss: {value: 0.2, min: 0, max: 1, doc: probability that a tick is lost}  # set by hand\n"],
         ["  loss: {value: 0.5, min: 0, max: 1, doc: probability that a tick is lost}  # set by hand\n"],
         ["~ loss: 0.2 -> 0.5", "~ lossy.probability: 0.2 -> 0.5"],
     ),
     "attach an aspect": (
         TEXT,
-        lambda text: editing.add_part(text, "", "aspects", "late", "Latency", {"delay": "1 s", "at": "clock.output"}),
+        lambda text: editing.change(
+            text, "add_part", "", "aspects", "late", "Latency", {"delay": "1 s", "at": "clock.output"}
+        ),
         [],
         ["  late: {type: Latency, delay: 1 s, at: clock.output}\n"],
         [],
     ),
     "switch an aspect off": (
         TEXT,
-        lambda text: editing.switch(text, "", "lossy", False),
+        lambda text: editing.change(text, "switch", "", "lossy", False),
         ['  lossy: {type: PacketLoss, probability: "${loss}", at: "*.trigger"}  # now and then\n'],
         ['  lossy: {type: PacketLoss, probability: "${loss}", at: "*.trigger", enabled: false}  # now and then\n'],
         [],
     ),
     "remove the last aspect": (
         TEXT,
-        lambda text: editing.remove(text, "", "aspects", "lossy"),
+        lambda text: editing.change(text, "remove", "", "aspects", "lossy"),
         ["aspects:\n", '  lossy: {type: PacketLoss, probability: "${loss}", at: "*.trigger"}  # now and then\n'],
         [],
         [],
     ),
     "in brackets: connect": (
         FLOW,
-        lambda text: editing.connect(text, "", "sum.output", "gain.input"),
+        lambda text: editing.change(text, "connect", "", "sum.output", "gain.input"),
         [' connections: [clock.output -> gain.input, "gain.output -> sum.input"], run: {stop: 3 s}}\n'],
         [FLOW.splitlines(keepends=True)[-1].replace("], run", ", sum.output -> gain.input], run")],
         [],
     ),
     "in brackets: disconnect": (
         FLOW,
-        lambda text: editing.disconnect(text, "", "clock.output", "gain.input"),
+        lambda text: editing.change(text, "disconnect", "", "clock.output", "gain.input"),
         [' connections: [clock.output -> gain.input, "gain.output -> sum.input"], run: {stop: 3 s}}\n'],
         [' connections: ["gain.output -> sum.input"], run: {stop: 3 s}}\n'],
         [],
     ),
     "in brackets: add": (
         FLOW,
-        lambda text: editing.add_part(text, "", "actors", "more", "Merge", {}),
+        lambda text: editing.change(text, "add_part", "", "actors", "more", "Merge", {}),
         ["  },\n"],
         ["  , more: {type: Merge}},\n"],
         [],
     ),
     "in brackets: a value for a key without one": (
         FLOW,
-        lambda text: editing.set_parameter(text, "", "parameters", "b", "", "2"),
+        lambda text: editing.change(text, "set_parameter", "", "parameters", "b", "", "2"),
         [FLOW.splitlines(keepends=True)[0]],
         ["{model: flow, parameters: {a: 1, b: 2}, actors: {\n"],
         [],
     ),
     "inside of a composite: connect": (
         COMPOSITE,
-        lambda text: editing.connect(text, "Pair", "gain.output", "other.input"),
+        lambda text: editing.change(text, "connect", "Pair", "gain.output", "other.input"),
         [],
         ["      - gain.output -> other.input\n"],
         ["+ pair.gain.output -> pair.other.input"],
     ),
     "inside of a composite: one of several": (
         COMPOSITE,
-        lambda text: editing.disconnect(text, "Pair", "tick", "gain.input"),
+        lambda text: editing.change(text, "disconnect", "Pair", "tick", "gain.input"),
         ["      - tick -> gain.input, other.input\n"],
         ["      - tick -> other.input\n"],
         ["- pair.tick -> pair.gain.input"],
     ),
     "inside of a composite: the first aspect": (
         COMPOSITE,
-        lambda text: editing.add_part(
-            text, "Pair", "aspects", "lossy", "PacketLoss", {"probability": "0.5", "at": "gain.input"}
+        lambda text: editing.change(
+            text, "add_part", "Pair", "aspects", "lossy", "PacketLoss", {"probability": "0.5", "at": "gain.input"}
         ),
         [],
         ["    aspects:\n", "      lossy: {type: PacketLoss, probability: 0.5, at: gain.input}\n"],
@@ -264,9 +259,9 @@ def test_edits_make_one_text_of_the_other(name: str) -> None:
 
 
 def test_what_a_swapped_aspect_does_not_know_goes(tmp_path: Path) -> None:
-    after = editing.swap(TEXT, knowledge(TEXT, tmp_path), "", "lossy", "Latency")
+    after = editing.change(TEXT, "swap", "", "lossy", "Latency", knowledge(TEXT, tmp_path))
     assert '  lossy: {type: Latency, at: "*.trigger"}  # now and then\n' in after
-    same = editing.swap(TEXT, knowledge(TEXT, tmp_path), "", "lossy", "Corrupt")
+    same = editing.change(TEXT, "swap", "", "lossy", "Corrupt", knowledge(TEXT, tmp_path))
     assert '  lossy: {type: Corrupt, probability: "${loss}", at: "*.trigger"}  # now and then\n' in same
 
 
@@ -274,10 +269,12 @@ def test_a_model_grows_from_nothing(tmp_path: Path) -> None:
     text = "# mine\n"
     text = set_value(text, ("model",), "grown")
     text = set_value(text, ("run",), "{stop: 3 s}")
-    text = editing.add_part(text, "", "aspects", "lossy", "PacketLoss", {"probability": "0.5", "at": "*.input"})
-    text = editing.add_part(text, "", "actors", "clock", "Clock", {"period": "1 s"})
-    text = editing.add_part(text, "", "actors", "gain", "Scale", {"factor": "2"})
-    text = editing.connect(text, "", "clock.output", "gain.input")
+    text = editing.change(
+        text, "add_part", "", "aspects", "lossy", "PacketLoss", {"probability": "0.5", "at": "*.input"}
+    )
+    text = editing.change(text, "add_part", "", "actors", "clock", "Clock", {"period": "1 s"})
+    text = editing.change(text, "add_part", "", "actors", "gain", "Scale", {"factor": "2"})
+    text = editing.change(text, "connect", "", "clock.output", "gain.input")
     assert text == (
         "# mine\nmodel: grown\n"
         "actors:\n  clock: {type: Clock, period: 1 s}\n  gain: {type: Scale, factor: 2}\n"
@@ -291,7 +288,7 @@ def test_a_model_grows_from_nothing(tmp_path: Path) -> None:
 def test_a_disturbance_is_dropped_in(tmp_path: Path) -> None:
     disturbance = "disturbance: rain\nparameters: {wet: 0.3}\nset: {loss: 0.7}\naspects:\n"
     disturbance += '  rain: {type: PacketLoss, probability: "${wet}", at: left.trigger}\n'
-    assert changes(TEXT, editing.drop_in(TEXT, disturbance), tmp_path) == [
+    assert changes(TEXT, editing.change(TEXT, "drop_in", "", disturbance), tmp_path) == [
         "~ loss: 0.2 -> 0.7",
         "+ wet: 0.3",
         "~ lossy.probability: 0.2 -> 0.7",
@@ -306,15 +303,15 @@ def test_switching_off_and_on_leaves_a_packaged_model_as_it_was(name: str) -> No
     text = packaged_models()[name].read_text(encoding="utf-8")
     data = data_of(text)
     for aspect in data.get("aspects", {}):
-        off = editing.switch(text, "", aspect, False)
+        off = editing.change(text, "switch", "", aspect, False)
         gone, come = lines(text, off)
         assert len(gone) <= 1 <= len(come)
-        assert editing.switch(off, "", aspect, True) == text
+        assert editing.change(off, "switch", "", aspect, True) == text
     for actor, said in data.get("actors", {}).items():
         if "type" in said:
             assert set_value(text, ("actors", actor, "type"), said["type"]) == text
-        new = editing.add_part(text, "", "actors", f"{actor}_twin", "Merge", {})
-        assert editing.remove(new, "", "actors", f"{actor}_twin") == text
+        new = editing.change(text, "add_part", "", "actors", f"{actor}_twin", "Merge", {})
+        assert editing.change(new, "remove", "", "actors", f"{actor}_twin") == text
 
 
 # -- what is refused, and what cannot get in --------------------------------------------------------------------------
@@ -384,12 +381,12 @@ def test_a_value_stays_one_value(said: str, text: str) -> None:
 @pytest.mark.parametrize("said", HOSTILE)
 def test_a_name_is_a_name(said: str) -> None:
     acts: dict[str, Act] = {
-        "is not a name: use letters, digits and _, and no digit first": lambda text: editing.add_part(
-            text, "", "actors", said, "Clock", {}
+        "is not a name: use letters, digits and _, and no digit first": lambda text: editing.change(
+            text, "add_part", "", "actors", said, "Clock", {}
         ),
-        "is not the name of a type": lambda text: editing.add_part(text, "", "actors", "new", said, {}),
-        "is not a port: write actor.port, or a port of the composite": lambda text: editing.connect(
-            text, "", f"clock.{said}", "left.trigger"
+        "is not the name of a type": lambda text: editing.change(text, "add_part", "", "actors", "new", said, {}),
+        "is not a port: write actor.port, or a port of the composite": lambda text: editing.change(
+            text, "connect", "", f"clock.{said}", "left.trigger"
         ),
     }
     for message, act in acts.items():
@@ -405,26 +402,29 @@ def test_a_name_is_a_name(said: str) -> None:
 @pytest.mark.parametrize(
     ("act", "message"),
     [
-        (lambda text: editing.disconnect(text, "", "a.b", "c.d"), "there is no connection a.b -> c.d in this text"),
-        (lambda text: editing.remove(text, "", "aspects", "none"), "there is no aspects.none in this text"),
         (
-            lambda text: editing.set_parameter(text, "", "actors", "none", "x", "1"),
+            lambda text: editing.change(text, "disconnect", "", "a.b", "c.d"),
+            "there is no connection a.b -> c.d in this text",
+        ),
+        (lambda text: editing.change(text, "remove", "", "aspects", "none"), "there is no aspects.none in this text"),
+        (
+            lambda text: editing.change(text, "set_parameter", "", "actors", "none", "x", "1"),
             "there is no actors.none in this text",
         ),
         (
-            lambda text: editing.add_part(text, "", "actors", "clock", "Clock", {}),
+            lambda text: editing.change(text, "add_part", "", "actors", "clock", "Clock", {}),
             "there is already 'clock' among the actors",
         ),
         (
-            lambda text: editing.connect(text, "None", "a.b", "c.d"),
-            "there is no composites in this text",
+            lambda text: editing.change(text, "connect", "None", "a.b", "c.d"),
+            "there is no composites.None in this text",
         ),
         (
-            lambda text: editing.drop_in(text, "model: x"),
+            lambda text: editing.change(text, "drop_in", "", "model: x"),
             "this is not a disturbance that consists of parameters, values and aspects only",
         ),
         (
-            lambda text: editing.connect(text + "x: [", "", "a.b", "c.d"),
+            lambda text: editing.change(text + "x: [", "connect", "", "a.b", "c.d"),
             "this can be changed once the text can be read: broken YAML: did not find expected node content",
         ),
     ],
@@ -438,10 +438,10 @@ def test_what_cannot_be_changed_is_said(act: Act, message: str) -> None:
 def test_an_alias_is_left_to_its_author() -> None:
     text = "model: x\nactors:\n  a: {type: Clock, period: &p 1 s}\n  b: {type: Clock, period: *p}\n"
     with pytest.raises(EditError) as caught:
-        editing.set_parameter(text, "", "actors", "b", "period", "2 s")
+        editing.change(text, "set_parameter", "", "actors", "b", "period", "2 s")
     assert str(caught.value) == "actors.b.period is an alias: change it by hand"
     with pytest.raises(EditError) as caught:
-        editing.set_parameter(text, "", "actors", "a", "period", "2 s")
+        editing.change(text, "set_parameter", "", "actors", "a", "period", "2 s")
     assert str(caught.value) == ("this text is written in a way that no program can change here: change it by hand")
 
 
@@ -456,16 +456,16 @@ def test_bounds_are_numbers_in_the_unit_of_the_parameter(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     "act",
     [
-        lambda text: editing.remove(text, "", "actors", "a"),
-        lambda text: editing.remove(text, "", "aspects", "a"),
-        lambda text: editing.switch(text, "", "a", False),
-        lambda text: editing.switch(text, "", "a", True),
-        lambda text: editing.add_part(text, "", "actors", "b", "Clock", {}),
-        lambda text: editing.add_part(text, "", "aspects", "b", "PacketLoss", {"at": "a.b"}),
-        lambda text: editing.connect(text, "", "a.b", "c.d"),
-        lambda text: editing.disconnect(text, "", "a.b", "c.d"),
-        lambda text: editing.set_parameter(text, "", "actors", "a", "period", "1 s"),
-        lambda text: editing.drop_in("model: m\n", text),
+        lambda text: editing.change(text, "remove", "", "actors", "a"),
+        lambda text: editing.change(text, "remove", "", "aspects", "a"),
+        lambda text: editing.change(text, "switch", "", "a", False),
+        lambda text: editing.change(text, "switch", "", "a", True),
+        lambda text: editing.change(text, "add_part", "", "actors", "b", "Clock", {}),
+        lambda text: editing.change(text, "add_part", "", "aspects", "b", "PacketLoss", {"at": "a.b"}),
+        lambda text: editing.change(text, "connect", "", "a.b", "c.d"),
+        lambda text: editing.change(text, "disconnect", "", "a.b", "c.d"),
+        lambda text: editing.change(text, "set_parameter", "", "actors", "a", "period", "1 s"),
+        lambda text: editing.change("model: m\n", "drop_in", "", text),
     ],
 )
 @pytest.mark.parametrize("text", ["model: m\nactors: {a: {type: Clock\n", "a: 1\na: 2\n", "\x00", "a: *b\n", "[" * 500])

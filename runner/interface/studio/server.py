@@ -31,14 +31,14 @@ from epicycle.actors import EpicycleError, read_regular
 from ...model.text.document import MAX_BYTES
 from ...show.view.page import PARTS, part, script
 from ...show.view.recording import ViewError
-from ...support.apart import DEAD, DONE, LATE, Outcome, Process
+from ...study.run.processes import Processes
+from ...support.apart import DEAD, LATE
 from ...support.files import replace_file
 from .worker import Message, Worker
 
 OWN = ("socket", "text", "wiring", "fields", "running", "what_if", "arrange")  # in this order
 LONGEST = 2 * MAX_BYTES + 100_000  # bytes of a message, in which a character may take several
 READING, GRACE = 30.0, 10.0  # s that reading a text may take, and that a run may take beyond its limit
-START = 60.0  # s that a process may take until it listens
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -52,67 +52,46 @@ Scope = MutableMapping[str, Any]
 
 
 class Workers:
-    """One process at a time, in which ``make`` makes what answers; of the questions that wait, only the latest of each
+    """A process at a time, in which ``make`` makes what answers; of the questions that wait, only the latest of each
     kind is asked.
 
     With ``stops``, a question ends the one that is being answered.
     """
 
-    def __init__(self, name: str, patience: float, make: Callable[[], Any], *, stops: bool = False) -> None:
+    def __init__(self, name: str, patience: float, make: Callable[[], Worker], *, stops: bool = False) -> None:
         self.name = name
         self.patience = patience  # s
         self.stops = stops
-        self._make = partial(Process, make)
-        self._process: Process | None = None
+        self.processes = Processes(make)
         self._turn = asyncio.Lock()
         self._latest: dict[str, Message] = {}
 
     async def ask(self, question: Message, tell: Tell) -> Message:
         """The answer; what comes before it goes to ``tell``.  A process that fails gives an answer that says so."""
         self._latest[str(question["ask"])] = question
-        if self.stops and self._process is not None:
-            self._process.hasten()
+        if self.stops:
+            self.processes.hasten()
         # The turn ends with the answer, even if nobody waits for it any longer.
         return await asyncio.shield(asyncio.create_task(self._in_turn(question, tell)))
 
     async def _in_turn(self, question: Message, tell: Tell) -> Message:
         loop = asyncio.get_running_loop()
+
+        def told(said: Message) -> None:
+            asyncio.run_coroutine_threadsafe(tell(said), loop)
+
         async with self._turn:
             if self._latest.get(str(question["ask"])) is not question:
                 return {"stale": True}
-            what, found = await asyncio.to_thread(
-                self._outcome, question, lambda said: asyncio.run_coroutine_threadsafe(tell(said), loop)
-            )
-        if what == DONE:
-            answer: Message = found
-            return answer
-        self.stop()
+            try:
+                what, answer = await asyncio.to_thread(self.processes.make, question, self.patience, told=told)
+            except EpicycleError:
+                what, answer = DEAD, None
         if what == LATE:
-            return {"error": f"the {self.name} took longer than {self.patience:g} s, and was ended"}
-        return {"error": f"the {self.name} has died; it starts again with the next change"}
-
-    def _outcome(self, question: Message, told: Callable[[Message], object]) -> Outcome:
-        """What comes of a question to the process, which is started unless it runs."""
-        if self._process is None or self._process.is_over:
-            self._process = self._make()
-        try:
-            outcome = self._process.begin(START)
-            if outcome[0] == DONE:
-                outcome = self._process.call("answer", question, limit=self.patience, told=told)
-        except EpicycleError:
-            return DEAD, None
-        return outcome
-
-    def close(self) -> None:
-        """End the process; it is no longer asked anything."""
-        self._latest.clear()
-        self.stop()
-
-    def stop(self) -> None:
-        """End the process; the next question starts another one."""
-        if self._process is not None:
-            self._process.end()
-        self._process = None
+            answer = {"error": f"the {self.name} took longer than {self.patience:g} s, and was ended"}
+        elif what == DEAD:
+            answer = {"error": f"the {self.name} has died; it starts again with the next change"}
+        return dict(answer)
 
 
 class Document:
@@ -266,7 +245,7 @@ class Studio:
         """While it serves, there are workers."""
         yield
         for each in (self.reading, *self.running.values()):
-            each.close()
+            each.processes.end()
 
 
 def _own(name: str) -> str:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,8 +27,9 @@ from ...show.view.drawing import drawn
 from ...show.view.page import data_of, metrics
 from ...show.view.pages import recorded
 from ...show.view.recording import Recording
+from ...study.run import processes
 from ...study.run_spec import OpenedRun, RunSpec, named
-from ...support.apart import is_hastened, say
+from ...support.apart import bound, is_hastened, say
 from ..calls.changes import classes
 
 MEMORY = 4 << 30  # bytes that a worker may take
@@ -44,7 +44,7 @@ class StaleError(Exception):
     """A newer question waits."""
 
 
-class Worker:
+class Worker(processes.Worker):
     """Everything that a process knows: the text under work, and the limits of runs."""
 
     def __init__(
@@ -60,15 +60,11 @@ class Worker:
 
     @classmethod
     def limited(cls, *given: Any) -> Worker:
-        """One that takes no more memory than a model needs; what is too large fails here, not on the whole machine."""
-        with suppress(ImportError, OSError, ValueError):
-            import resource
-
-            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-            resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+        """One that takes no more memory than a model needs."""
+        bound(MEMORY)
         return cls(*given)
 
-    def answer(self, asked: Message) -> Message:
+    def make(self, asked: Message) -> Message:
         """The answer to a question; what is wrong with it is said in words."""
         try:
             return self._answer(asked)
@@ -100,14 +96,8 @@ class Worker:
     def read(self, asked: Message) -> Message:
         """Problems at once, then the graph of what is valid so far, and what can be set."""
         knowledge = self.knowledge
-        problems = []
-        for problem, edit in self.answers.problems(knowledge):
-            found = _DATA.unstructure(problem)
-            if edit is not None and edit.path.resolve() == self.path:
-                found["fix"] = _DATA.unstructure(self.answers.text_edit(knowledge, edit))
-            problems.append(found)
         reading = knowledge.reading
-        self.say({"problems": problems, "valid": reading.is_valid})
+        self.say({"problems": _DATA.unstructure(self.answers.problems(knowledge)), "valid": reading.is_valid})
         reading = controls.so_far(reading, self.answers.texts)
         model, known = reading.loading.model, knowledge if reading is knowledge.reading else Knowledge(reading)
         if model is None:
@@ -150,10 +140,9 @@ class Worker:
         if what in ("connect", "disconnect"):
             given = controls.local_ends(self.knowledge, *map(str, given))
         elif what == "swap":
-            given = [self.knowledge, "", *map(str, given)]
+            given = [*map(str, given), self.knowledge]
         before = self.answers.texts[self.path]
-        after = editing.CHANGES[what](before, *given)
-        edits = edits_between(self.path, before, after)
+        edits = edits_between(self.path, before, editing.change(before, what, *given))
         return {"edits": [_DATA.unstructure(self.answers.text_edit(self.knowledge, each)) for each in edits]}
 
     # -- runs -----------------------------------------------------------------------------------------------------
@@ -173,18 +162,11 @@ class Worker:
             [OpenedRun(self.model, None, None)], most=MOST, progress=False, watch=partial(self._watch, tells=True)
         )
         [recording] = page.recordings
-        results = recording.results
-        assert results is not None
+        results = recording.finished("the studio")
         return {
             "digest": results.digest,
-            "metrics": metrics(recording),
-            "monitors": [
-                [name, each.holds and not each.missing, each.missing or each.remark or ("" if each.holds else "broken")]
-                for name, each in results.monitors.items()
-            ],
-            "records": recording.records,
-            "seconds": time.monotonic() - started,
             "stopped": results.stopped,
+            "seconds": time.monotonic() - started,
             "failed": "".join(str(each) for each in page.errors if isinstance(each, EpicycleError)),
             "ended": self.ended,
             "view": data_of([recording]),

@@ -128,6 +128,7 @@ def _monitor(recording: Recording, name: str, verdict: Verdict) -> dict[str, Any
     return {
         "name": name,
         "property": required.property,
+        "holds": verdict.holds is True and not verdict.missing,
         "text": (said or "broken") + ("" if verdict.missing else margin),
         "time": None if verdict.holds else time,
     }

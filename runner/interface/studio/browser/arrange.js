@@ -154,7 +154,7 @@ class Studio {
     const counted = (/** @type {number} */ count, /** @type {string} */ word) => `${count} ${word}${count === 1 ? "" : "s"}`;
     this.summary.textContent = problems.length ? [errors && counted(errors, "problem"), others && counted(others, "warning")].filter(Boolean).join(", ") : "no problems";
     this.summary.dataset.kind = errors ? "error" : others ? "warning" : "fine";
-    this.problems.replaceChildren(...problems.map(({ range, severity, code, message, relatedInformation, fix }) => {
+    this.problems.replaceChildren(...problems.map(({ range, severity, code, message, relatedInformation, data: fix }) => {
       const [said, ...help] = message.split("\nhelp: ");
       const go = button(relatedInformation ? "another file" : `line ${range.start.line + 1}`, () => this.editor.show(range), "link");
       const made = element("li", { className: severity === 1 ? "error" : "warning" }, go,
@@ -284,7 +284,7 @@ class Studio {
   /** @param {File} file */
   async dropIn(file) {
     if (!file || file.size > LARGEST) return this.say("A disturbance is a YAML file of at most 1 MB.");
-    await this.edit("drop_in", await file.text());
+    await this.edit("drop_in", "", await file.text());
   }
 
   /** @param {string} words */

@@ -115,7 +115,7 @@ function aspectRow(aspect, { edit, names }) {
     element("p", { className: "place" }, "at ", place), fields.box, more);
   box.dataset.aspect = aspect.name;
   on.addEventListener("change", () => edit("switch", "", aspect.name, on.checked));
-  type.addEventListener("change", () => edit("swap", aspect.name, type.value.trim()));
+  type.addEventListener("change", () => edit("swap", "", aspect.name, type.value.trim()));
   return {
     box,
     /** @param {Aspect} aspect */

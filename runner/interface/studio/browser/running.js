@@ -6,9 +6,9 @@ class Running {
     this.link = link;
     this.shown = shown; // told of a run that is over
     this.latest = 0;
-    /** @type {RunAnswer | null} */
-    this.before = null; // of the run before
-    /** @type {RunAnswer | null} */
+    /** @type {Run | null} */
+    this.before = null;
+    /** @type {Run | null} */
     this.now = null;
     this.status = element("p", { className: "status", role: "status" });
     this.bar = element("progress", { max: 1, value: 0, hidden: true });
@@ -42,19 +42,20 @@ class Running {
       this.box.classList.add("stale");
       return this.say(found.error, "failed");
     }
+    const data = await readData(found.view), [run] = data.runs;
+    if (number !== this.latest) return;
     this.box.classList.remove("stale");
-    [this.before, this.now] = [this.now, found];
-    this.say(found.failed || found.ended || `${found.records.toLocaleString("en")} events in ${found.seconds.toFixed(2)} s; ended by ${found.stopped}`,
+    [this.before, this.now] = [this.now, run];
+    this.say(found.failed || found.ended || `${run.records.toLocaleString("en")} events in ${found.seconds.toFixed(2)} s; ended by ${run.stopped}`,
       found.failed ? "failed" : found.ended ? "ended" : "done");
-    this.table(found.metrics, this.before?.metrics);
-    this.monitors.replaceChildren(...found.monitors.map(([name, holds, remark]) =>
+    this.table(run.metrics, this.before?.metrics);
+    this.monitors.replaceChildren(...run.monitors.map(({ name, holds, text: remark }) =>
       element("li", { className: holds ? "holds" : "broken", text: `${name} ${holds ? "holds" : remark}` })));
-    const moved = this.before && (this.before.digest === found.digest ? "the same run as before" : "another run than before");
+    const moved = this.before && (this.before.digest === run.digest ? "the same run as before" : "another run than before");
     this.digest.replaceChildren(
-      ...(moved ? [element("b", { text: moved, className: this.before.digest === found.digest ? "same" : "moved" }), " "] : []),
-      element("code", { text: found.digest.slice(0, 16), title: `digest of the event log: ${found.digest}` }));
-    const data = await readData(found.view);
-    if (number === this.latest) this.shown(data, { text, until: found.ended ? data.runs[0].end / 1e9 : null });
+      ...(moved ? [element("b", { text: moved, className: this.before.digest === run.digest ? "same" : "moved" }), " "] : []),
+      element("code", { text: run.digest.slice(0, 16), title: `digest of the event log: ${run.digest}` }));
+    this.shown(data, { text, until: found.ended ? run.end / 1e9 : null });
   }
 
   // The text has changed: what is shown belongs to the one before.

@@ -4,7 +4,7 @@
 const CM = window.CodeMirror;
 // What the kinds of completions are called here.
 /** @type {{ [kind: number]: string }} */
-const KINDS = { 3: "function", 6: "parameter", 7: "type", 8: "port", 9: "actor", 10: "key", 11: "unit", 17: "file", 20: "value" };
+const KINDS = { 3: "function", 6: "parameter", 7: "type", 8: "port", 9: "actor", 10: "key", 11: "unit", 20: "value" };
 const TOKENS = ["parameter", "port", "actor", "aspect", "composite", "metric", "monitor", "figure"]; // as the server counts them
 const SUGGESTIONS = 500;
 
@@ -90,7 +90,7 @@ class TextEditor {
   /** @param {Diagnostic[]} problems */
   setProblems(problems) {
     const places = new Places(this.text);
-    const found = problems.filter((each) => !each.relatedInformation).map(({ range, severity, code, message, fix }) => ({
+    const found = problems.filter((each) => !each.relatedInformation).map(({ range, severity, code, message, data: fix }) => ({
       ...places.stretch(range),
       severity: severity === 1 ? "error" : "warning",
       source: code,

@@ -22,7 +22,7 @@ interface Diagnostic {
   code: string;
   message: string;
   relatedInformation?: unknown[]; // it is about another file
-  fix?: TextEdit;
+  data?: TextEdit; // the change that removes it
 }
 
 interface CompletionItem {
@@ -79,11 +79,8 @@ interface Metric extends Array<string | number | null> {
 
 interface RunAnswer {
   digest: string;
-  metrics: Metric[];
-  monitors: [name: string, holds: boolean, remark: string][];
-  records: number;
-  seconds: number;
   stopped: string;
+  seconds: number;
   failed: string;
   ended: string;
   view: any;

@@ -83,6 +83,7 @@ interface ModelDrawing {
 interface Monitor {
   name: string;
   property: string;
+  holds: boolean;
   text: string;
   time: number | null; // ns
 }
