@@ -11,7 +11,6 @@ from typing import Any
 from epicycle.actors import units_like
 from epicycle.actors.expression import FUNCTIONS
 
-from ..model.catalogue.packaged import packaged_models
 from ..model.text.document import Mapping
 from .knowledge import Knowledge, Known, owner_of
 from .names import MODEL
@@ -79,10 +78,8 @@ def _values(place: Place, knowledge: Knowledge) -> Iterator[Known]:
         yield from _names(owner, before, knowledge)
     elif keys[:1] == ("connections",) and named[-1] in ("connections", "from", "to"):
         yield from _ends(owner, named, before, knowledge)
-    elif named[-1:] == ["type"]:
-        yield from _types(keys, before, knowledge, place)
-    elif named[-1:] in (["extends"], ["include"]):
-        yield from _files(owner, named[-1], before, knowledge)
+    elif named[-1:] == ["type"] or (named[-1:] == ["extends"] and owner != MODEL):
+        yield from _types(owner, keys, before, knowledge, place)
     elif named[-1:] == ["inherit"]:
         names = ["all", *knowledge.names.declared(owner, "parameter")]
         yield from (Known(each, "parameter", replaces=len(before)) for each in names)
@@ -123,30 +120,12 @@ def _ends(owner: str, keys: list[str], before: str, knowledge: Knowledge) -> Ite
     yield from (replace(each, replaces=len(part)) for each in own)
 
 
-def _types(keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Known]:
-    section = str(keys[0])
-    if len(keys) == 3 and section in ("actors", "aspects"):
+def _types(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Known]:
+    if keys == ("extends",) or (len(keys) == 3 and keys[0] in ("actors", "aspects")):
         for name in knowledge.names.classes:
-            if name:
-                yield Known(name, "type", "composite", knowledge.of_type(name, section), len(before))
+            if name and (name != owner or len(keys) == 3):
+                yield Known(name, "type", "composite", knowledge.of_type(name, "actors"), len(before))
     yield from _chosen(place, knowledge, "type")
-    if "at" in keys:  # of a pointcut
-        graph = knowledge.graph
-        kinds = dict.fromkeys(each.kind for each in graph.components.values()) if graph is not None else ()
-        yield from (Known(kind, "type", replaces=len(before)) for kind in kinds)
-
-
-def _files(owner: str, key: str, before: str, knowledge: Knowledge) -> Iterator[Known]:
-    if key == "extends" and owner != MODEL:
-        classes = (each for each in knowledge.names.classes if each not in ("", owner))
-        yield from (Known(each, "type", "composite", replaces=len(before)) for each in classes)
-        return
-    folder, own = knowledge.reading.path.parent, knowledge.reading.path
-    for each in sorted((*folder.glob("*.yaml"), *folder.glob("*/*.yaml")))[:200]:
-        if each != own:
-            yield Known(each.relative_to(folder).as_posix(), "file", replaces=len(before))
-    if key == "extends":
-        yield from (Known(each, "file", "a packaged model", replaces=len(before)) for each in packaged_models())
 
 
 def _plain(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Known]:

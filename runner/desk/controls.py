@@ -41,15 +41,17 @@ def so_far(reading: Reading, texts: Texts = NO_TEXTS) -> Reading:
 def parameters(knowledge: Knowledge) -> list[dict[str, Any]]:
     """The parameters that the model declares in this text, as fields."""
     model = knowledge.reading.loading.model
-    found = []
-    for name, entry in knowledge.names.declared(MODEL, "parameter").items():
-        if entry.key.position.file == knowledge.file:
-            said = value_of(entry.value, "value") if isinstance(entry.value, MappingNode) else entry.value
-            value = None if model is None else model.parameters.get(name)
-            declared = None if model is None else model.declared.get(name)
-            known = None if declared is None else as_parameter(declared, type(value))
-            found.append(_field(name, known, said, value))
-    return found
+    declared, values = ({}, {}) if model is None else (model.declared, model.parameters)
+    return [
+        _field(
+            name,
+            as_parameter(declared[name], type(values.get(name))) if name in declared else None,
+            value_of(entry.value, "value") if isinstance(entry.value, MappingNode) else entry.value,
+            values.get(name),
+        )
+        for name, entry in knowledge.names.declared(MODEL, "parameter").items()
+        if entry.key.position.file == knowledge.file
+    ]
 
 
 def fields(knowledge: Knowledge, owner: str, section: str, name: str) -> list[dict[str, Any]]:

@@ -30,7 +30,7 @@ from .reading import Reading
 class Known:
     """Something that may be written somewhere: it takes the place of so many characters before the cursor.
 
-    ``kind`` is key, type, actor, port, parameter, value, unit, path, function or file.
+    ``kind`` is key, type, actor, port, parameter, value, unit, path or function.
     """
 
     text: str

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from epicycle.actors import declared_ports, type_name
+from epicycle.actors import bounds_text, declared_ports, type_name
 
 from ..model.catalogue.packaged import packaged_models
 from ..model.catalogue.reference import as_written, shown
@@ -15,7 +15,7 @@ from ..model.text.patterns import in_general
 from ..model.text.problems import Position, Problems
 from ..model.text.reading import Text
 from ..support.shown import short
-from .knowledge import Knowledge, Known, owner_of
+from .knowledge import Knowledge, Known, as_parameter, owner_of
 from .names import MODEL, Name, Use
 from .places import Keys, Place, place_at, scalars, value_of
 from .schema import allowed, described, language
@@ -111,14 +111,11 @@ def _of_parameter(knowledge: Knowledge, name: Name) -> str:
         text += f" = `{short(value)}` ({origin})"
     if found is None:
         return text
-    limits = [
-        f"{key} {shown(as_written(value))}"
-        for key in ("min", "above", "max")
-        if (value := getattr(found, key)) is not None
-    ]
-    limits += [f"one of {', '.join(found.choices)}"] if found.choices else []
-    unit = [f"in {found.unit}"] if found.unit not in ("", "1") else []
-    return "\n\n".join(each for each in (text, ", ".join([*unit, *limits]), found.doc) if each)
+    said = as_parameter(found)
+    unit = f"in {said.unit}" if said.unit not in ("", "1") else ""
+    bounds = bounds_text(said.min, said.above, said.max, "{:g}".format).strip()
+    limits = [unit, bounds, f"one of {', '.join(said.choices)}" if said.choices else ""]
+    return "\n\n".join(filter(None, (text, ", ".join(filter(None, limits)), said.doc)))
 
 
 def _of_port(knowledge: Knowledge, place: Place) -> Iterator[str]:
