@@ -16,7 +16,7 @@ from . import changes, completion, meaning
 from .knowledge import Knowledge
 from .names import SECTIONS, declared_in
 from .places import Positions, positions
-from .reading import read
+from .reading import Parsed, read
 
 FIX_ALL = lsp.CodeActionKind("source.fixAll")
 _SEVERITY = {"error": lsp.DiagnosticSeverity.Error, "warning": lsp.DiagnosticSeverity.Warning}
@@ -52,29 +52,25 @@ class Answers:
         self.types = types
         self.encoding = encoding
         self.texts: dict[Path, str] = {}
-        self._known: dict[Path, Knowledge] = {}  # perhaps of texts that have changed since
-        self._current = set[Path]()
+        self._known: dict[Path, Knowledge] = {}
+        self._parsed: Parsed = {}
 
     def change(self, path: Path, text: str | None) -> list[Path]:
         """Open a text, change it, or close it (None); the open files to which that makes a difference."""
         path = path.resolve()
         if text is None:
             self.texts.pop(path, None)
-            self._known.pop(path, None)
-            self._current.discard(path)
         else:
             self.texts[path] = text
-        stale = {path, *(each for each in self._current if path in _files(self._known[each]))}
-        self._current -= stale
+        stale = {path, *(each for each, known in self._known.items() if path in _files(known))}
+        self._known = {each: known for each, known in self._known.items() if each not in stale}
         return [each for each in stale if each in self.texts]
 
     def knowledge(self, path: Path) -> Knowledge:
         """What is known of an open file, or of one on disk."""
         path = path.resolve()
-        if path not in self._current:
-            before = self._known[path].reading if path in self._known else None
-            self._known[path] = Knowledge(read(path, self.texts, self.types, before=before))
-            self._current.add(path)
+        if path not in self._known:
+            self._known[path] = Knowledge(read(path, self.texts, self.types, parsed=self._parsed))
         return self._known[path]
 
     def around(self, path: Path) -> Knowledge:
@@ -168,8 +164,7 @@ class Answers:
     def complete(self, known: Knowledge, params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
         line, column = self.place(known, params)
         at, found = self._at(known.text), []
-        before = self._known[known.path].reading if known.path in self._known else None
-        for each in completion.complete(known.path, line, column, self.texts, self.types, before):
+        for each in completion.complete(known.path, line, column, self.texts, self.types, self._parsed):
             start = at.offset(line, max(column - each.replaces, 0))
             item = lsp.CompletionItem(each.text.strip().removesuffix(":"), kind=_LOOKS[each.kind][0])
             item.detail, item.documentation, item.filter_text = each.what or None, each.doc or None, each.text

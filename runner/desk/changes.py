@@ -116,6 +116,8 @@ def sample(parameter: Parameter[Any] | None) -> str | None:
     if parameter.type not in (int, float, int | float):
         return None
     low, high = parameter.min, parameter.max
+    if (low, high) == (0, 1) and parameter.type is not int:
+        return "0.1"  # of a share, so that one sees what it does
     value = 1 if (low is None or low <= 1) and (high is None or high >= 1) else low if low is not None else high
     unit = parameter.unit if parameter.unit not in ("", "1") else ""
     return f"{value:g} {unit}".rstrip()
@@ -192,7 +194,7 @@ def _owners(names: Iterable[Name]) -> str:
 def _check(reading: Reading, edits: list[Edit], name: Name, texts: Texts) -> None:
     """Raise ``RenameError`` if the model would be another one."""
     changed = {path.resolve(): text for path, text in texts_after(reading, edits).items()}
-    after = read(reading.path, {**texts, **changed}, reading.types, before=reading)
+    after = read(reading.path, {**texts, **changed}, reading.types, parsed=reading.parsed)
     if _shape(after) != _shape(reading):
         new = [each for each in after.problems if each.severity == "error"]
         why = str(new[0]) if new and reading.is_valid else "the model would be another one"

@@ -15,7 +15,7 @@ from ..model.text.document import Mapping
 from .knowledge import Knowledge, Known, owner_of
 from .names import MODEL
 from .places import Keys, Place, lines_of, place_at, value_of
-from .reading import NO_TEXTS, Reading, Texts, read
+from .reading import NO_TEXTS, Parsed, Texts, read
 from .schema import allowed, applying, described, language
 
 _PATH = re.compile(r"!?\s*((?:[\w*]+(?:\[[^\]\s]*\])?\.)*)[\w*\[\]]*\Z")
@@ -30,16 +30,16 @@ def complete(
     column: int,
     texts: Texts = NO_TEXTS,
     types: tuple[type, ...] = (),
-    before: Reading | None = None,
+    parsed: Parsed | None = None,
 ) -> list[Known]:
-    """What may be written in a file, which was read ``before``, at a line and column, which count from 0."""
+    """What may be written in a file at a line and column, which count from 0; texts may have been ``parsed``."""
     text = texts.get(path.resolve())
     if text is None:
         text = path.read_text(encoding="utf-8", errors="replace")
     place = place_at(text, line, column)
     if place is None:
         return []
-    knowledge = Knowledge(read(path, {**texts, path.resolve(): place.text}, types, before=before))
+    knowledge = Knowledge(read(path, {**texts, path.resolve(): place.text}, types, parsed=parsed))
     follows = lines_of(text)[line][column:]
     found = list(_keys(place, knowledge, follows) if place.is_key else _values(place, knowledge))
     if not place.is_key and lines_of(text)[line][:column].strip() == place.before:  # perhaps a first key

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from epicycle.actors import Parameter, declared_parameters, paths
@@ -31,7 +31,7 @@ def so_far(reading: Reading, texts: Texts = NO_TEXTS) -> Reading:
         lines = lines_of(text)
         lines[at.line - 1] = ""
         text = "\n".join(lines)
-        tried = read(reading.path, {**texts, reading.path.resolve(): text}, reading.types, before=reading)
+        tried = read(reading.path, {**texts, reading.path.resolve(): text}, reading.types, parsed=reading.parsed)
     return reading if tried.loading.model is None else tried
 
 
@@ -118,21 +118,19 @@ def types(knowledge: Knowledge) -> dict[str, list[dict[str, Any]]]:
     catalogue, _ = knowledge.catalogue.loaded()
     return {
         section: [
-            {"name": name, "doc": first_sentence(doc_of(cls)), "needs": _needed(declared_parameters(cls).values())}
+            {
+                "name": name,
+                "doc": first_sentence(doc_of(cls)),
+                "needs": {
+                    each.name: value
+                    for each in declared_parameters(cls).values()
+                    if each.required and (value := sample(each)) is not None
+                },
+            }
             for name, cls in known.items()
         ]
         for section, known in (("actors", catalogue.actors), ("aspects", catalogue.aspects))
     }
-
-
-def _needed(declared: Iterable[Parameter[Any]]) -> dict[str, str]:
-    """Values for parameters that need one: small ones, so that one sees what they do."""
-    found = {}
-    for each in declared:
-        if each.required and (value := sample(each)) is not None:
-            is_share = each.min == 0 and each.max == 1 and each.type is not int
-            found[each.name] = "0.1" if is_share else value
-    return found
 
 
 # -- wires ------------------------------------------------------------------------------------------------------------

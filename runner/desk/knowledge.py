@@ -152,23 +152,18 @@ class Knowledge:
         graph, scope = self.graph, self.scope(owner)
         if graph is None or scope is None:
             return
-        inside = {scope}
-        if start:
-            holders = [path for path in graph.components if path.startswith(scope) and path + "." != scope]
-            try:
-                inside = {f"{path}." if path else "" for path in select(scope + start[:-1], holders)}
-            except PatternError:
-                return
-        parts = dict[str, str]()
-        for path, component in graph.components.items():
-            if path and _before_last(path) in inside:
-                parts.setdefault(in_general(path.rpartition(".")[2]), component.kind)
-        yield from (Known(name, "path", kind) for name, kind in parts.items())
-        ports = (each for each in graph.ports if _before_last(each) in inside and graph.direction(each) in directions)
+        pattern = f"{scope}{start}*"
+        try:
+            parts = select(pattern, graph.components)
+            ports = select(pattern, (each for each in graph.ports if graph.direction(each) in directions))
+        except PatternError:
+            return
+        kinds = {in_general(path.rpartition(".")[2]): graph.components[path].kind for path in reversed(parts) if path}
+        yield from (Known(name, "path", kind) for name, kind in kinds.items())
         for name, number in Counter(path.rpartition(".")[2] for path in ports).items():
             yield Known(name, "path", f"matches {counted(number, 'port')}")
-        if not start and parts:
-            yield Known("*", "path", f"matches {counted(len(parts), 'name')}")
+        if not start and kinds:
+            yield Known("*", "path", f"matches {counted(len(kinds), 'name')}")
 
     # -- words ----------------------------------------------------------------------------------------------------
 
@@ -178,10 +173,6 @@ class Knowledge:
             return first_sentence(self.names.said(name, "doc"))
         cls = self.type_called(name, section)
         return "" if cls is None else first_sentence(doc_of(cls))
-
-
-def _before_last(path: str) -> str:
-    return path[: path.rfind(".") + 1]
 
 
 def as_parameter(said: ParameterText, kind: type = float) -> Parameter[Any]:

@@ -17,7 +17,7 @@ from ..model.language.files import read_library
 from ..model.language.models import LIBRARY
 from ..model.language.study import read_study
 from ..model.text.document import Mapping as MappingNode
-from ..model.text.document import Node, parse
+from ..model.text.document import Node, parse_once
 from ..model.text.document import read as read_node
 from ..model.text.files import opened
 from ..model.text.kinds import FILE
@@ -26,6 +26,7 @@ from ..support.collection import without_collection
 
 Texts = Mapping[Path, str]
 NO_TEXTS: Texts = MappingProxyType({})
+Parsed = dict[str, tuple[str, Any]]  # the latest texts without problems, by their names in messages, and what they hold
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Reading:
     files: Mapping[str, tuple[Path, str]]
     types: tuple[type, ...] = ()
     nodes: Mapping[str, Node] = field(default_factory=dict)
-    parsed: Mapping[tuple[str, str], Node] = field(default_factory=dict)  # what texts without problems hold
+    parsed: Parsed = field(default_factory=dict)
 
     @property
     def is_valid(self) -> bool:
@@ -60,20 +61,20 @@ def read(
     texts: Texts = NO_TEXTS,
     types: Iterable[type] = (),
     *,
-    before: Reading | None = None,
+    parsed: Parsed | None = None,
     **changes: Any,
 ) -> Reading:
     """Read a model, a study, a disturbance, or a file of composite classes; never raises because of what it holds.
 
     ``texts`` are read in place of files, by their resolved paths; ``types`` are classes that the model may name, and
-    ``changes`` those of ``load_model``.  Of what was read ``before``, files that have not changed are not parsed again.
+    ``changes`` those of ``load_model``.  What has not changed since it was ``parsed`` is not parsed again.
     """
     is_file = isinstance(name, Path) or is_path(name)
     path = Path(name) if is_file else packaged_models().get(str(name), Path(name))
     types, loading = tuple(types), Loading()
     given: Any = {**changes, "types": types}
     found, more = list[Problem](), False
-    with opened(texts, {} if before is None else before.parsed) as known, without_collection():
+    with opened(texts, parsed) as known, without_collection():
         try:
             if is_file:
                 _passes(path, loading, given)
@@ -84,8 +85,7 @@ def read(
             found, more = list(error.problems), error.more
         except EpicycleError as error:
             found = [Problem(str(error), kind=FILE)]
-    parsed = {(name, text): known.parsed.get((name, text)) for name, (_, text) in known.read.items()}
-    nodes = {name: node or parse(text, name, Problems()) for (name, text), node in parsed.items()}
+    nodes = {name: parse_once(text, name, Problems(), known) for name, (_, text) in known.read.items()}
     return Reading(
         path,
         (*found, *loading.problems.warnings),
@@ -94,7 +94,7 @@ def read(
         known.read,
         types,
         {name: node for name, node in nodes.items() if node is not None},
-        {key: node for key, node in parsed.items() if node is not None},
+        known.parsed,
     )
 
 

@@ -46,7 +46,7 @@ def applying(root: Schema, schemas: Iterable[Schema], node: Node) -> Iterator[Sc
         yield each
         waiting += [*each.get("allOf", ()), *each.get("anyOf", ())]
         if "if" in each:
-            branch = each.get("then" if _holds(root, each["if"], node) else "else")
+            branch = each.get("then" if _holds(each["if"], node) else "else")
             waiting += [branch] if isinstance(branch, dict) else []
 
 
@@ -64,16 +64,10 @@ def _below(schema: Schema, key: str | int) -> Iterator[Schema]:
         yield found
 
 
-def _holds(root: Schema, condition: Schema, node: Node) -> bool:
-    """Whether a node fulfils a condition of the few forms that the schema uses."""
-    if "$ref" in condition:
-        return _holds(root, root["$defs"][condition["$ref"].rpartition("/")[2]], node)
-    if "not" in condition:
-        return not _holds(root, condition["not"], node)
+def _holds(condition: Schema, node: Node) -> bool:
+    """Whether a node has what a condition asks for: of all its forms, those on which it depends what may be written."""
     values = {key: each.value for key, each in node.entries.items()} if isinstance(node, Mapping) else {}
-    if not values.keys() >= set(condition.get("required", ())):
-        return False
-    for key, wanted in condition.get("properties", {}).items():
-        if key in values and "const" in wanted and getattr(values[key], "value", None) != wanted["const"]:
-            return False
-    return "type" not in condition or condition["type"] != "object" or isinstance(node, Mapping)
+    wanted = {key: each["const"] for key, each in condition.get("properties", {}).items() if "const" in each}
+    return values.keys() >= set(condition.get("required", ())) and all(
+        getattr(values.get(key), "value", None) == each for key, each in wanted.items()
+    )

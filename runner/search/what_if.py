@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 from epicycle.actors import (
     EpicycleError,
@@ -74,17 +74,17 @@ def what_if(
 
     ``watch`` gives what is called with the time of each run now and then, in place of a bar.
     """
-    fork = forked(model, at, changes, seed=seed, until=until, watch=watch)
+    other, acts, words = forked(model, at, changes, seed=seed, until=until, watch=watch)
     page = recorded(
-        [OpenedRun(each, seed, until) for each in (model, fork.model)],
+        [OpenedRun(each, seed, until) for each in (model, other)],
         names=[AS_IT_WAS, INSTEAD],
-        acts=[None, fork.acts],
+        acts=[None, acts],
         progress=progress,
         watch=watch,
     )
     if any(isinstance(each, KeyboardInterrupt) for each in page.errors):
         raise KeyboardInterrupt
-    found = WhatIf(model, at, fork.words, page)
+    found = WhatIf(model, at, words, page)
     if found.before.stopped == _FAILED:
         raise page.errors[0]
     if found.first is not None and found.first.at < at:
@@ -95,14 +95,6 @@ def what_if(
     return found
 
 
-class Fork(NamedTuple):
-    """What makes the run with changes: a model, the rules for acts of aspects, and the changes in words."""
-
-    model: Model
-    acts: Interventions
-    words: list[str]
-
-
 def forked(
     model: Model,
     at: Tag,
@@ -111,8 +103,11 @@ def forked(
     seed: int | None = None,
     until: float | None = None,
     watch: Watch | None = None,
-) -> Fork:
-    """The model with changes from a tag on; raises ``EpicycleError``."""
+) -> tuple[Model, Interventions, list[str]]:
+    """What makes the run with changes from a tag on: a model, the rules for acts of aspects; and the changes in words.
+
+    Raises ``EpicycleError``.
+    """
     other, words, always = copy.copy(model), list[str](), set[str]()
 
     def weave(aspect: _Changed | _Lost, places: Mapping[str, Any]) -> None:
@@ -147,7 +142,7 @@ def forked(
         ends=dict.fromkeys(changes.remove, at),
         always=frozenset(always),
     )
-    return Fork(other, rules, words)
+    return other, rules, words
 
 
 def tag_of(given: float | str | Tag) -> Tag:

@@ -73,11 +73,11 @@ def _forks_without_change(name: str, until: float | None, number: int) -> None:
         assert simulation.fork().run(until=stop).digest == plain.digest, tag
         path = drawn.choice(sorted(own)) if own else ""
         given = {path: getattr(own[path], path.rpartition(".")[2])} if path else {}
-        fork = forked(model, tag, Changes(change=given, lose=[drawn.choice(ports)]))
-        for woven in fork.model.aspects:
-            if woven.name == fork.model.aspects[-1].name:
+        other, acts, _ = forked(model, tag, Changes(change=given, lose=[drawn.choice(ports)]))
+        for woven in other.aspects:
+            if woven.name == other.aspects[-1].name:
                 vars(woven.aspect)["at_tag"] = Tag(2**62, 0)  # nothing is lost after all
-        assert Simulation(fork.model, acts=fork.acts).run(until=stop).digest == plain.digest, (tag, given)
+        assert Simulation(other, acts=acts).run(until=stop).digest == plain.digest, (tag, given)
 
 
 def _own(actor: Any) -> list[str]:

@@ -23,7 +23,7 @@ from yaml.events import (
 
 from epicycle.actors import MAX_DEPTH, did_you_mean, irregular, open_regular
 
-from .files import note_file, opened_text, present
+from .files import Opened, note_file, opened_text, present
 from .frames import Frame
 from .kinds import FILE, KEY, SIZE, SYNTAX, Kind
 from .nodes import Entry, Mapping, Node, Scalar, Sequence, plain
@@ -49,10 +49,18 @@ def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | 
     if (opened := present()) is None:
         return parse(text, name, problems)
     opened.read[name] = (path, text)
-    before = len(problems)
-    found: Node | None = opened.parsed.get((name, text)) or parse(text, name, problems)
-    if found is not None and len(problems) == before:
-        opened.parsed[name, text] = found
+    return parse_once(text, name, problems, opened)
+
+
+def parse_once(text: str, name: str, problems: Problems, opened: Opened) -> Node | None:
+    """As ``parse``, unless it is the latest text of that name, and had no problems."""
+    found: Node | None
+    known, found = opened.parsed.get(name, ("", None))
+    if known != text or found is None:
+        before = len(problems)
+        found = parse(text, name, problems)
+        if len(problems) == before:
+            opened.parsed[name] = text, found
     return found
 
 

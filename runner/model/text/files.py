@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from epicycle.actors import ParameterError, check_allowed, did_you_mean, irregular, read_regular
@@ -22,11 +21,11 @@ COMMAND_LINE = "command line"  # the file of a position in an option
 class Opened:
     """Texts read in place of files, by their resolved paths, and everything that is read, by its name in messages.
 
-    ``parsed`` is what texts without problems hold, by name and text: several passes read them; each is parsed once.
+    ``parsed`` are the latest texts without problems by the same names, and what they hold: several passes read them.
     """
 
     texts: Mapping[Path, str]
-    parsed: dict[tuple[str, str], Any]
+    parsed: dict[str, tuple[str, Any]]
     read: dict[str, tuple[Path, str]] = field(default_factory=dict)
 
 
@@ -34,9 +33,9 @@ _opened: ContextVar[Opened | None] = ContextVar("opened", default=None)
 
 
 @contextmanager
-def opened(texts: Mapping[Path, str], parsed: Mapping[tuple[str, str], Any] = MappingProxyType({})) -> Iterator[Opened]:
-    """Texts that are read in place of files, such as those of an editor; some may have been ``parsed`` before."""
-    found = Opened(texts, {**parsed})
+def opened(texts: Mapping[Path, str], parsed: dict[str, tuple[str, Any]] | None = None) -> Iterator[Opened]:
+    """Texts that are read in place of files, such as those of an editor; what is ``parsed`` is kept there."""
+    found = Opened(texts, {} if parsed is None else parsed)
     token = _opened.set(found)
     try:
         yield found
