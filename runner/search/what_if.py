@@ -253,17 +253,14 @@ def _next_acts(
             if act.name.aspect == aspect and place in ("", act.name.place, act.name.place.rpartition(" -> ")[2])
         ]
         # Times are compared as they are shown, so that one can be copied.
-        left = [act for act in mine if float(f"{act.time / 1e9:.9g}") >= at.seconds and act not in found]
+        later = [act for act in mine if float(f"{act.time / 1e9:.9g}") >= at.seconds]
+        left = sorted((act for act in later if act not in found), key=lambda act: act.time)
         if len(left) < number:
-            last = max((act.time for act in mine), default=None)
-            when = (
-                "in the whole run"
-                if last is None
-                else f"at {at.seconds:.9g} s or later: the last time is {last / 1e9:.9g} s"
-            )
-            what = f"does not act {number} times" if number > 1 else "does nothing"
-            raise EpicycleError(f"{aspect} {what}{' at ' + place if place else ''} {when}")
-        found.append(sorted(left, key=lambda act: act.time)[number - 1])
+            last = f": the last time is {max(act.time for act in mine) / 1e9:.9g} s" if mine else ""
+            where = f" at {place}" if place else ""
+            times = counted(len(later), "time")
+            raise EpicycleError(f"{aspect} acts {times}{where} at {at.seconds:.9g} s or later{last}")
+        found.append(left[number - 1])
     return found
 
 

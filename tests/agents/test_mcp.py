@@ -18,9 +18,10 @@ pytest.importorskip("mcp")  # the extra 'agents'
 
 from mcp import Client, StdioServerParameters
 from mcp.client.stdio import stdio_client
+from mcp.server.mcpserver.exceptions import ToolError
 
 import epicycle
-from epicycle.runner.interface.agents import LimitedCall, ToolError
+from epicycle.runner.interface.agents import LimitedCall
 from epicycle.runner.interface.cli import main
 
 MODEL = """model: line
@@ -238,9 +239,9 @@ def test_hostile_arguments_end_with_a_message(folder: Path, tmp_path: Path) -> N
     ("words", "message"),
     [
         (["\ud83d"], f"there is no file {chr(0xD83D)!r} in the folder of this server"),
-        (["mm1", "\ud83d="], "the arguments have more than 100,000 characters, or are no text"),
-        (["mm1", "--set=a=\0"], "the arguments have more than 100,000 characters, or are no text"),
-        (["mm1", *["--set=load=0.5"] * 10_000], "the arguments have more than 100,000 characters, or are no text"),
+        (["mm1", "\ud83d="], "the arguments are no text"),
+        (["mm1", "--set=a=\0"], "the arguments are no text"),
+        (["mm1", *["--set=load=0.5"] * 10_000], "the arguments have more than 100,000 characters"),
         (["a" * 5_000 + ".yaml"], f"there is no file {'a' * 200!r} in the folder of this server"),
     ],
 )

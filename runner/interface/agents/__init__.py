@@ -1,5 +1,5 @@
 """Agents: a server of the Model Context Protocol, whose tools are the commands, in processes with limits."""
 
-from .limited import LimitedCall, ToolError
+from .limited import LimitedCall
 
-__all__ = ["LimitedCall", "ToolError"]
+__all__ = ["LimitedCall"]

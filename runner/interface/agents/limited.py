@@ -10,6 +10,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from mcp.server.mcpserver.exceptions import ToolError
+
 from epicycle.actors import FOLDERS
 
 from ...model.catalogue.packaged import model_folders
@@ -21,10 +23,6 @@ _PROGRAM = (
     f"from epicycle.runner.support.apart import bound; bound({_MEMORY}, {_FILE})\n"
     "from runpy import run_module; run_module('epicycle', run_name='__main__')"
 )
-
-
-class ToolError(Exception):
-    """The message that an agent gets instead of a result."""
 
 
 class LimitedCall:
@@ -48,8 +46,8 @@ class LimitedCall:
             asked.append(f"-o={out}/{file}" if file else "--json")
             asked += [f"--types={each}" for each in self.types]
             words = [sys.executable, "-P", "-c", _PROGRAM, command, *asked, "--", *named]
-            if sum(map(len, words)) > _ARGUMENTS or not all(map(_is_text, words)):
-                raise ToolError(f"the arguments have more than {_ARGUMENTS:,} characters, or are no text")
+            if sum(map(len, words)) > _ARGUMENTS:
+                raise ToolError(f"the arguments have more than {_ARGUMENTS:,} characters")
             code, told, complained = self._run(words, out)
             if code not in good or not told:
                 raise ToolError((complained or told)[:_ANSWER] or f"the command ended with {code}")
@@ -105,17 +103,11 @@ class LimitedCall:
                 raise ToolError(
                     f"it was ended after {self.seconds:g} s: give an earlier 'until', fewer runs or a smaller model"
                 ) from None
+            except ValueError:  # a zero, or half of a pair
+                raise ToolError("the arguments are no text") from None
         if code < 0:
             raise ToolError(
                 f"it was ended by {signal.Signals(-code).name}: it may have needed too much memory or output"
             )
         said, wrong = (each.read_text("utf-8", errors="replace").replace(f"{out}/", "").strip() for each in streams)
         return code, said, wrong
-
-
-def _is_text(word: str) -> bool:
-    """Whether a process can be given a word."""
-    try:
-        return b"\0" not in word.encode()
-    except UnicodeEncodeError:  # half of a pair
-        return False

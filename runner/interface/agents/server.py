@@ -11,11 +11,10 @@ from typing import Any, NamedTuple
 import anyio.to_thread
 from mcp import types as mcp
 from mcp.server.mcpserver import MCPServer
-from mcp.server.mcpserver.exceptions import ResourceError
-from mcp.server.mcpserver.exceptions import ToolError as Refusal
+from mcp.server.mcpserver.exceptions import ResourceError, ToolError
 
 from ...model.catalogue.packaged import packaged_models
-from .limited import LimitedCall, ToolError
+from .limited import LimitedCall
 
 INSTRUCTIONS = """Epicycle simulates networks of actors. A model is YAML: read epicycle://language first, then write a
 model, 'validate' it, apply its fixes, 'run' it. A model is named by its packaged name, by its path in the folder of the
@@ -118,11 +117,7 @@ class Assisting(MCPServer):
         return [each.described() for each in self.offered.values()]
 
     async def call_tool(self, name: str, arguments: dict[str, Any], context: Any = None) -> mcp.CallToolResult:
-        try:
-            found = await anyio.to_thread.run_sync(self._answer, name, arguments)
-        except ToolError as error:
-            raise Refusal(str(error)) from None
-        return mcp.CallToolResult(content=[found])
+        return mcp.CallToolResult(content=[await anyio.to_thread.run_sync(self._answer, name, arguments)])
 
     def _answer(self, name: str, given: Mapping[str, Any]) -> mcp.ContentBlock:
         if (chosen := self.offered.get(name)) is None:
