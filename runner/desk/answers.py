@@ -15,7 +15,7 @@ from ..model.text.problems import Position, Problem
 from . import changes, completion, meaning
 from .knowledge import Knowledge
 from .names import SECTIONS, declared_in
-from .places import Positions, positions
+from .places import positions
 from .reading import Parsed, read
 
 FIX_ALL = lsp.CodeActionKind("source.fixAll")
@@ -90,28 +90,23 @@ class Answers:
 
     # -- places ---------------------------------------------------------------------------------------------------
 
-    def _at(self, text: str) -> Positions:
-        return positions(text, self.encoding)
-
-    def place(self, known: Knowledge, params: Any) -> tuple[int, int]:
-        """Our line and column of the place that a request is about."""
-        at = self._at(known.text)
-        return at.place(at.from_client(params.position.line, params.position.character))
+    def place(self, known: Knowledge, params: Any) -> int:
+        """The offset of the place that a request is about."""
+        return positions(known.text, self.encoding).from_client(params.position.line, params.position.character)
 
     def _range(self, text: str, start: int, end: int) -> lsp.Range:
-        count = self._at(text).to_client
+        count = positions(text, self.encoding).to_client
         return lsp.Range(lsp.Position(*count(start)), lsp.Position(*count(end)))
 
     def range_of(self, known: Knowledge, at: Position) -> lsp.Range:
-        _, start, end = known.stretch(at)
-        return self._range(known.reading.files[at.file][1] if at.file in known.reading.files else "", start, end)
+        path, start, end = known.stretch(at)
+        return self._range(known.texts.get(path, ""), start, end)
 
     def locations(self, known: Knowledge, found: Iterable[Position]) -> list[lsp.Location]:
         return [lsp.Location(uri_of(known.stretch(at)[0]), self.range_of(known, at)) for at in found]
 
     def text_edit(self, known: Knowledge, edit: changes.Edit) -> lsp.TextEdit:
-        text = dict(known.reading.files.values())[edit.path]
-        return lsp.TextEdit(self._range(text, edit.start, edit.end), edit.text)
+        return lsp.TextEdit(self._range(known.texts[edit.path], edit.start, edit.end), edit.text)
 
     def workspace_edit(self, known: Knowledge, edits: Iterable[changes.Edit]) -> lsp.WorkspaceEdit:
         found: dict[str, list[lsp.TextEdit]] = {}
@@ -162,32 +157,31 @@ class Answers:
     # -- requests about a place -----------------------------------------------------------------------------------
 
     def complete(self, known: Knowledge, params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
-        line, column = self.place(known, params)
-        at, found = self._at(known.text), []
-        for each in completion.complete(known.path, line, column, self.texts, self.types, self._parsed):
-            start = at.offset(line, max(column - each.replaces, 0))
+        offset, found = self.place(known, params), []
+        for each in completion.complete(known.path, offset, self.texts, self.types, self._parsed):
+            start = max(offset - each.replaces, known.text.rfind("\n", 0, offset) + 1)
             item = lsp.CompletionItem(each.text.strip().removesuffix(":"), kind=_LOOKS[each.kind][0])
             item.detail, item.documentation, item.filter_text = each.what or None, each.doc or None, each.text
-            item.text_edit = lsp.TextEdit(self._range(known.text, start, at.offset(line, column)), each.text)
+            item.text_edit = lsp.TextEdit(self._range(known.text, start, offset), each.text)
             found.append(item)
         return found
 
     def hover(self, known: Knowledge, params: lsp.HoverParams) -> lsp.Hover | None:
-        text = meaning.hover(known, *self.place(known, params))
+        text = meaning.hover(known, self.place(known, params))
         return lsp.Hover(lsp.MarkupContent(lsp.MarkupKind.Markdown, text)) if text else None
 
     def definition(self, known: Knowledge, params: lsp.DefinitionParams) -> list[lsp.Location]:
-        return self.locations(known, meaning.definition(known, *self.place(known, params)))
+        return self.locations(known, meaning.definition(known, self.place(known, params)))
 
     def references(self, known: Knowledge, params: lsp.ReferenceParams) -> list[lsp.Location]:
-        return self.locations(known, meaning.references(known, *self.place(known, params)))
+        return self.locations(known, meaning.references(known, self.place(known, params)))
 
     def prepare(self, known: Knowledge, params: lsp.PrepareRenameParams) -> lsp.Range | None:
-        use = known.names.at(known.file, *self.place(known, params))
+        use = known.use_at(self.place(known, params))
         return None if use is None else self.range_of(known, use.position)
 
     def rename(self, known: Knowledge, params: lsp.RenameParams) -> lsp.WorkspaceEdit:
-        edits = changes.rename(known, *self.place(known, params), params.new_name, self.texts)
+        edits = changes.rename(known, self.place(known, params), params.new_name, self.texts)
         return self.workspace_edit(known, edits)
 
     # -- requests about a text ------------------------------------------------------------------------------------

@@ -136,7 +136,7 @@ def _fix_data(knowledge: Knowledge, problem: Problem) -> dict[str, Any]:
     """The change that removes a problem."""
     if (edit := fix(knowledge, problem)) is None:
         return {}
-    line, column = positions(dict(knowledge.reading.files.values())[edit.path]).place(edit.start)
+    line, column = positions(knowledge.texts[edit.path]).place(edit.start)
     place = {"file": str(edit.path), "line": line + 1, "column": column + 1, "length": edit.end - edit.start}
     return {"fix": {**place, "text": edit.text}}
 
@@ -158,13 +158,13 @@ def as_data(problem: Problem) -> dict[str, Any]:
 # -- names ------------------------------------------------------------------------------------------------------------
 
 
-def rename(knowledge: Knowledge, line: int, column: int, new: str, texts: Texts = NO_TEXTS) -> list[Edit]:
-    """Give what stands at a line and column another name, wherever it is used; raises ``RenameError``.
+def rename(knowledge: Knowledge, offset: int, new: str, texts: Texts = NO_TEXTS) -> list[Edit]:
+    """Give what stands at a place another name, wherever it is used; raises ``RenameError``.
 
     The model afterwards must be what it was before: as many actors, connections, and places of aspects.
     """
     reading, names = knowledge.reading, knowledge.names
-    use = names.at(knowledge.file, line, column)
+    use = knowledge.use_at(offset)
     if use is None:
         raise RenameError("there is no name here that can be changed")
     name, *others = sorted(use.names, key=str)

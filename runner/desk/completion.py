@@ -5,17 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 from epicycle.actors import units_like
 from epicycle.actors.expression import FUNCTIONS
 
-from ..model.text.document import Mapping
+from ..model.text.document import LINE_BREAK, Mapping
 from .knowledge import Knowledge, Known, owner_of
 from .names import MODEL
-from .places import Keys, Place, lines_of, place_at, value_of
-from .reading import NO_TEXTS, Parsed, Texts, read
+from .places import Keys, Place, place_at, value_of
+from .reading import Parsed, Texts, read
 from .schema import allowed, applying, described, language
 
 _PATH = re.compile(r"!?\s*((?:[\w*]+(?:\[[^\]\s]*\])?\.)*)[\w*\[\]]*\Z")
@@ -26,23 +27,20 @@ _OF_PORTS = {"of", "record", "stop_when", "property", "signals", "robots", "obst
 
 def complete(
     path: Path,
-    line: int,
-    column: int,
-    texts: Texts = NO_TEXTS,
+    offset: int,
+    texts: Texts,
     types: tuple[type, ...] = (),
     parsed: Parsed | None = None,
 ) -> list[Known]:
-    """What may be written in a file at a line and column, which count from 0; texts may have been ``parsed``."""
-    text = texts.get(path.resolve())
-    if text is None:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    place = place_at(text, line, column)
+    """What may be written in one of some texts before a character; they may have been ``parsed``."""
+    text = texts[path.resolve()]
+    place = place_at(text, offset)
     if place is None:
         return []
     knowledge = Knowledge(read(path, {**texts, path.resolve(): place.text}, types, parsed=parsed))
-    follows = lines_of(text)[line][column:]
+    follows = text[offset:]
     found = list(_keys(place, knowledge, follows) if place.is_key else _values(place, knowledge))
-    if not place.is_key and lines_of(text)[line][:column].strip() == place.before:  # perhaps a first key
+    if not place.is_key and LINE_BREAK.split(text[:offset])[-1].strip() == place.before:  # perhaps a first key
         found += _keys(place, knowledge, follows)
     return list({(each.text, each.kind): each for each in found}.values())
 
@@ -63,7 +61,7 @@ def _keys(place: Place, knowledge: Knowledge, follows: str) -> Iterator[Known]:
         for kind in knowledge.names.inner(owner, str(keys[1])):
             for name, parameter in knowledge.composite_parameters(kind).items():
                 found[name] = f"parameter of {kind}", parameter.doc
-    ending = "" if re.match(r"\w*\s*:", follows) else ": "
+    ending = "" if re.match(r"\w*[ \t]*:", follows) else ": "
     return (Known(key + ending, "key", *said, len(place.before)) for key, said in found.items() if key not in there)
 
 
@@ -91,10 +89,10 @@ def _names(owner: str, before: str, knowledge: Knowledge) -> Iterator[Known]:
     """Inside of an expression."""
     length = len(before) - len(re.sub(r"\w+\Z", "", before))
     model = knowledge.reading.loading.model if owner == MODEL else None
+    known = knowledge.composite_parameters(owner) if model is None else model.declared
     for name in knowledge.names.declared(owner, "parameter"):
         value = f"= {model.parameters[name]}" if model is not None and name in model.parameters else ""
-        doc = model.declared[name].doc if model is not None and name in model.declared else ""
-        yield Known(name, "parameter", value, doc, length)
+        yield Known(name, "parameter", value, known[name].doc if name in known else "", length)
     yield Known("index", "parameter", "the index of an instance in its array", "", length)
     yield from (Known(name, "function", replaces=length) for name in sorted(FUNCTIONS))
 
@@ -163,9 +161,7 @@ def _chosen(place: Place, knowledge: Knowledge, kind: str) -> Iterator[Known]:
     """The values that the schema lists."""
     root = language(knowledge.reading.types)
     for each in allowed(root, place.around[0], place.keys):
-        docs = each.get("enumDescriptions", ())
-        for number, value in enumerate(each.get("enum", ())):
-            doc = docs[number] if number < len(docs) else ""
+        for value, doc in zip_longest(each.get("enum", ()), each.get("enumDescriptions", ()), fillvalue=""):
             yield Known(str(value), kind, "", doc, len(place.before))
         kinds = each["type"] if isinstance(each.get("type"), list) else [each.get("type")]
         if "boolean" in kinds and "number" not in kinds:

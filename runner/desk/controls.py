@@ -8,14 +8,14 @@ from typing import Any
 from epicycle.actors import Parameter, declared_parameters, paths
 
 from ..model.catalogue.reference import as_written, doc_of, first_sentence, shown
+from ..model.text.document import LINE_BREAK, Node, Scalar, plain
 from ..model.text.document import Mapping as MappingNode
-from ..model.text.document import Node, Scalar, plain
 from . import parts
 from .changes import sample
 from .knowledge import Knowledge, as_parameter
 from .names import MODEL
 from .parts import EditError
-from .places import lines_of, value_of
+from .places import value_of
 from .reading import NO_TEXTS, Reading, Texts, read
 
 _ATTEMPTS = 3
@@ -28,7 +28,7 @@ def so_far(reading: Reading, texts: Texts = NO_TEXTS) -> Reading:
         at = tried.problems[0].position if tried.problems else None
         if tried.loading.model is not None or at is None or at.file != reading.name:
             break
-        lines = lines_of(text)
+        lines = LINE_BREAK.split(text)
         lines[at.line - 1] = ""
         text = "\n".join(lines)
         tried = read(reading.path, {**texts, reading.path.resolve(): text}, reading.types, parsed=reading.parsed)
@@ -56,7 +56,7 @@ def parameters(knowledge: Knowledge) -> list[dict[str, Any]]:
 
 def fields(knowledge: Knowledge, owner: str, section: str, name: str) -> list[dict[str, Any]]:
     """The parameters of an actor or aspect, as fields."""
-    entry = knowledge.names.entry(owner, section.removesuffix("s"), name)
+    entry = knowledge.names.entry(owner, section, name)
     made = knowledge.made(owner, section, name)
     made = made.aspect if section == "aspects" and made is not None else made
     known: dict[str, Parameter[Any]] = {}
@@ -136,7 +136,7 @@ def types(knowledge: Knowledge) -> dict[str, list[dict[str, Any]]]:
 # -- wires ------------------------------------------------------------------------------------------------------------
 
 
-def local_ends(knowledge: Knowledge, source: str, target: str) -> tuple[str, str, str]:
+def local_ends(knowledge: Knowledge, source: str, target: str) -> list[str]:
     """The class in which two ports of the graph are connected, and how it names them; raises ``EditError``.
 
     Ports are paths of the graph; ``[*]`` is all of an array.
@@ -160,4 +160,4 @@ def local_ends(knowledge: Knowledge, source: str, target: str) -> tuple[str, str
     if scope and (entry is None or entry.key.position.file != knowledge.file):
         raise EditError(f"{kind} is declared in another file: change it there")
     inside = f"{scope}." if scope else ""
-    return kind, source[len(inside) :], target[len(inside) :]
+    return [kind, source[len(inside) :], target[len(inside) :]]

@@ -19,8 +19,10 @@ from .knowledge import Knowledge
 from .names import MODEL
 from .parts import EditError, data_of, path, rendered, typed, written
 
-_ENDS = re.compile(PORT_SCHEMA["pattern"])
-_TYPE = re.compile(r"[A-Za-z_]\w*(?:[.:][A-Za-z_]\w*)*\Z")
+# What something may be, and how that is said.
+_NAME = NAME, f"a name: {NAMES_HAVE}"
+_TYPE = re.compile(r"[A-Za-z_]\w*(?:[.:][A-Za-z_]\w*)*"), "the name of a type"
+_END = re.compile(PORT_SCHEMA["pattern"]), "a port: write actor.port, or a port of the composite"
 
 
 def change(text: str, what: str, owner: str, *given: Any) -> str:
@@ -35,13 +37,13 @@ def change(text: str, what: str, owner: str, *given: Any) -> str:
 
 def connect(data: Any, source: str, target: str) -> None:
     """Connect two ports."""
-    _check_ends(source, target)
+    _check(_END, source, target)
     _section(data, "connections", []).append(f"{source} -> {target}")
 
 
 def disconnect(data: Any, source: str, target: str) -> None:
     """Remove the connection of two ports, which may be one of several that an item makes."""
-    _check_ends(source, target)
+    _check(_END, source, target)
     items = _section(data, "connections", [])
     for number, (item, pairs) in enumerate(_connections(items)):
         if (source, target) not in pairs:
@@ -71,10 +73,10 @@ def _connections(items: list[Any]) -> Iterator[tuple[Any, list[tuple[str, str]]]
 
 def add_part(data: Any, section: str, name: str, kind: str, values: Mapping[str, str]) -> None:
     """Add an actor or an aspect of a type, with values as somebody types them."""
-    _check_type(kind)
+    _check(_TYPE, kind)
     _add(data, section, name, {"type": kind, **{key: typed(each) for key, each in values.items()}})
     for key in values:
-        _check_name(key)
+        _check(_NAME, key)
 
 
 def remove(data: Any, section: str, name: str) -> None:
@@ -100,7 +102,7 @@ def set_parameter(data: Any, section: str, name: str, parameter: str, said: str)
     if section == "parameters":
         _set_declared(data, name, typed(said))
     else:
-        _check_name(parameter)
+        _check(_NAME, parameter)
         _mapping(data, section, name)[parameter] = typed(said)
 
 
@@ -114,7 +116,7 @@ def switch(data: Any, name: str, on: bool) -> None:
 
 def swap(data: Any, name: str, kind: str, knowledge: Knowledge) -> None:
     """Put an aspect of another type in the place of one; of its values, those remain that the other type takes."""
-    _check_type(kind)
+    _check(_TYPE, kind)
     known = knowledge.parameters_of(kind, "aspects")
     part = _mapping(data, "aspects", name)
     part["type"] = kind
@@ -172,23 +174,14 @@ def _mapping(data: Any, *keys: str) -> Any:
 
 
 def _add(data: Any, section: str, name: str, value: Any) -> None:
-    _check_name(name)
+    _check(_NAME, name)
     if name in (parts := _section(data, section, {})):
         raise EditError(f"there is already {name!r} among the {section}")
     parts[name] = value
 
 
-def _check_name(name: str) -> None:
-    if not NAME.match(name):
-        raise EditError(f"{name!r} is not a name: {NAMES_HAVE}")
-
-
-def _check_type(kind: str) -> None:
-    if not _TYPE.match(kind):
-        raise EditError(f"{kind!r} is not the name of a type")
-
-
-def _check_ends(*ends: str) -> None:
-    for each in ends:
-        if not _ENDS.match(each) or "\n" in each:
-            raise EditError(f"{each!r} is not a port: write actor.port, or a port of the composite")
+def _check(kind: tuple[re.Pattern[str], str], *texts: str) -> None:
+    pattern, said = kind
+    for each in texts:
+        if not pattern.fullmatch(each):
+            raise EditError(f"{each!r} is not {said}")

@@ -21,7 +21,7 @@ from ..model.temporal import Requirement
 from ..model.text.document import Scalar
 from ..model.text.patterns import PatternError, in_general, select
 from ..model.text.problems import Position
-from .names import MODEL, Names
+from .names import MODEL, Names, Use
 from .places import Keys, positions, text_of
 from .reading import Reading
 
@@ -46,6 +46,7 @@ class Knowledge:
     def __init__(self, reading: Reading, file: Path | None = None) -> None:
         self.reading = reading
         self.names = Names(reading)
+        self.texts = dict(reading.files.values())
         known = reading.files.items()
         self.path = (reading.path if file is None else file).resolve()
         self.file = next((name for name, (path, _) in known if path.resolve() == self.path), reading.name)
@@ -59,6 +60,15 @@ class Knowledge:
         path, text = self.reading.files.get(at.file, (Path(at.file), ""))
         start = positions(text).offset(at.line - 1, at.column - 1)
         return path, start, min(start + at.length, len(text))
+
+    def covers(self, at: Position, offset: int) -> bool:
+        """Whether a position is at a place in the file."""
+        _, start, end = self.stretch(at)
+        return at.file == self.file and start <= offset <= end
+
+    def use_at(self, offset: int) -> Use | None:
+        """The use of a name at a place in the file."""
+        return next((use for use in self.names.uses if self.covers(use.position, offset)), None)
 
     @cached_property
     def catalogue(self) -> Catalogue:
@@ -99,8 +109,7 @@ class Knowledge:
         section, part = str(keys[0]), str(keys[1])
         if section in ("metrics", "monitors"):
             return declared_parameters(MetricSpec if section == "metrics" else Requirement).get(name)
-        kinds = ("actor", "aspect") if section in ("actors", "aspects") else (section.removesuffix("s"),)
-        types = self.names.types_of(owner, part, *kinds)
+        types = self.names.types_of(owner, part, section)
         return next((each[name] for kind in types if name in (each := self.parameters_of(kind, section))), None)
 
     def unit_of(self, owner: str, keys: Keys) -> str:

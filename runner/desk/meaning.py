@@ -10,10 +10,8 @@ from epicycle.actors import bounds_text, declared_ports, type_name
 
 from ..model.catalogue.packaged import packaged_models
 from ..model.catalogue.reference import as_written, shown
-from ..model.language.files import named_file
 from ..model.text.patterns import in_general
-from ..model.text.problems import Position, Problems
-from ..model.text.reading import Text
+from ..model.text.problems import Position
 from ..support.shown import short
 from .knowledge import Knowledge, Known, as_parameter, owner_of
 from .names import MODEL, Name, Use
@@ -21,16 +19,14 @@ from .places import Keys, Place, place_at, scalars, value_of
 from .schema import allowed, described, language
 
 _PORT = re.compile(r"(?<![\w.])(?P<actor>[A-Za-z_]\w*)(?:\[[^\]]*\])?\.(?P<port>\w*)\Z")
-# The keys of a file that name others, and of which kind those are that may be packaged; a study names a model, too.
-_FILES = {"include": "", "extends": "model"}
 
 
-def definition(knowledge: Knowledge, line: int, column: int) -> list[Position]:
-    """Where what stands at a line and column of the file is declared; they count from 0."""
-    if uses := _uses(knowledge, line, column):
+def definition(knowledge: Knowledge, offset: int) -> list[Position]:
+    """Where what stands at a place in the file is declared."""
+    if uses := _uses(knowledge, offset):
         return [each.position for each in uses if each.declares]
     for at, path in links(knowledge):
-        if at.line == line + 1 and at.column - 1 <= column <= at.column - 1 + at.length:
+        if knowledge.covers(at, offset):
             return [Position(str(path), 1, 1, 0, "")]
     return []
 
@@ -38,25 +34,22 @@ def definition(knowledge: Knowledge, line: int, column: int) -> list[Position]:
 def links(knowledge: Knowledge) -> Iterator[tuple[Position, Path]]:
     """Where the file names another one, which it includes, extends or runs, and that file's path."""
     root, folder = knowledge.reading.nodes.get(knowledge.file), Path(knowledge.file).parent
-    known = packaged_models().values()  # of all others, a model takes only what is in its folder
-    is_study = value_of(root, "study") is not None
-    for key, kind in {**_FILES, **({"model": "model"} if is_study else {})}.items():
+    read = {path.resolve() for path, _ in knowledge.reading.files.values()}
+    is_study = value_of(root, "study") is not None  # whose model is not read with it
+    for key in ("model",) if is_study else ("include", "extends"):
         for each in scalars(value_of(root, key)):
-            said = Text(each.text, each.position)
-            path = named_file(said, folder, kind, Problems()) if kind else folder / each.text
-            if path is None or not path.is_file():
-                continue
-            if key == "model" or path in known or folder.resolve() in path.resolve().parents:
+            path = packaged_models().get(each.text, folder / each.text)
+            if path.is_file() and (is_study or path.resolve() in read):
                 yield each.position, path
 
 
-def references(knowledge: Knowledge, line: int, column: int) -> list[Position]:
-    """Where what stands at a line and column stands elsewhere, its declaration included."""
-    return [each.position for each in _uses(knowledge, line, column)]
+def references(knowledge: Knowledge, offset: int) -> list[Position]:
+    """Where what stands at a place stands elsewhere, its declaration included."""
+    return [each.position for each in _uses(knowledge, offset)]
 
 
-def _uses(knowledge: Knowledge, line: int, column: int) -> list[Use]:
-    use = knowledge.names.at(knowledge.file, line, column)
+def _uses(knowledge: Knowledge, offset: int) -> list[Use]:
+    use = knowledge.use_at(offset)
     names = use.names if use is not None else ()
     return list({each.position: each for name in names for each in knowledge.names.of(name)}.values())
 
@@ -64,12 +57,12 @@ def _uses(knowledge: Knowledge, line: int, column: int) -> list[Use]:
 # -- descriptions -----------------------------------------------------------------------------------------------------
 
 
-def hover(knowledge: Knowledge, line: int, column: int) -> str:
-    """What stands at a line and column, in Markdown; empty if that is nothing."""
-    use = knowledge.names.at(knowledge.file, line, column)
+def hover(knowledge: Knowledge, offset: int) -> str:
+    """What stands at a place, in Markdown; empty if that is nothing."""
+    use = knowledge.use_at(offset)
     names = sorted(use.names, key=str) if use is not None else []
     parts = [_of_name(knowledge, name) for name in names]
-    place = place_at(knowledge.text, line, column)
+    place = place_at(knowledge.text, offset)
     if place is not None and not any(each.kind in ("actor", "port") for each in names):
         parts += _of_port(knowledge, place)
         parts += _of_place(knowledge, place)

@@ -134,14 +134,6 @@ class Names:
 
     # -- what is used ---------------------------------------------------------------------------------------------
 
-    def at(self, file: str, line: int, column: int) -> Use | None:
-        """The use of a name at a place, which counts from 0."""
-        for use in self.uses:
-            at = use.position
-            if at.file == file and at.line == line + 1 and at.column - 1 <= column <= at.column - 1 + at.length:
-                return use
-        return None
-
     def of(self, name: Name) -> list[Use]:
         """Where a name stands."""
         return [use for use in self.uses if name in use.names]

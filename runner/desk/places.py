@@ -4,7 +4,7 @@ A mark is put at the place, and what is open there is closed, until the text can
 is found among the nodes.
 
 The lines of the Language Server Protocol end only at CR and LF, and its columns are code units.  All lines and columns
-count from 0 here, and ours do not count a byte order mark.
+count from 0 here, and ours do not count a byte order mark; an offset counts all characters before a place.
 """
 
 from __future__ import annotations
@@ -51,21 +51,9 @@ class Place(NamedTuple):
         return self.node.text.replace(MARK, "", 1)
 
 
-def lines_of(text: str) -> list[str]:
-    """The lines of a text, as positions count them."""
-    return LINE_BREAK.split(text)
-
-
-def place_at(text: str, line: int, column: int) -> Place | None:
-    """The place at a line and column, which count from 0; None if the text is too broken to say."""
-    lines = lines_of(text)
-    if line >= len(lines):
-        return None
-    here = lines[line]
-    column = min(column, len(here))
-    # The word under the cursor belongs to the place.
-    end = column + len(re.match(r"\w*", here[column:])[0])  # type: ignore[index]
-    for tried in _attempts(lines, line, column, end):
+def place_at(text: str, offset: int) -> Place | None:
+    """The place before a character; None if the text is too broken to say."""
+    for tried in _attempts(text, offset):
         root = parse(tried, "", Problems()) if _is_yaml(tried) else None
         if root is not None and (found := _marked(root, tried)) is not None:
             return found
@@ -82,11 +70,14 @@ def _is_yaml(text: str) -> bool:
     return True
 
 
-def _attempts(lines: list[str], line: int, column: int, end: int) -> Iterator[str]:
+def _attempts(text: str, offset: int) -> Iterator[str]:
     """The text with the mark, as it is and completed in several ways."""
-    start, rest, above, below = lines[line][:column], lines[line][column:], lines[:line], lines[line + 1 :]
-    word, closing = lines[line][column:end], _closing(start)
+    start, rest = LINE_BREAK.split(text[:offset])[-1], LINE_BREAK.split(text[offset:], maxsplit=1)[0]
+    above, below = text[: offset - len(start)], text[offset + len(rest) :]
+    # The word under the cursor belongs to the place.
+    word, closing = re.findall(r"\A\w*", rest)[0], _closing(start)
     indent = start[: len(start) - len(start.lstrip())]
+    outside = "\n".join(each for each in LINE_BREAK.split(below) if _is_outside(each, indent))
     for here in (
         f"{start}{MARK}{rest}",
         f"{start}{MARK}: {rest}",
@@ -97,10 +88,10 @@ def _attempts(lines: list[str], line: int, column: int, end: int) -> Iterator[st
         f"{start}{MARK}",
         f"{start}{MARK}: ",
     ):
-        yield "\n".join([*above, here, *below])
-        yield "\n".join([*above, here, *(each for each in below if _is_outside(each, indent))])
-        yield "\n".join([*above, here])
-        yield "\n".join([*above, here]) + _closing("\n".join([*above, start]))
+        yield f"{above}{here}{below}"
+        yield f"{above}{here}{outside}"
+        yield f"{above}{here}"
+        yield f"{above}{here}{_closing(above + start)}"
 
 
 def _is_outside(line: str, indent: str) -> bool:

@@ -76,8 +76,6 @@ def make_server(version: str, types: tuple[type, ...] = ()) -> Server:
     @server.feature(lsp.TEXT_DOCUMENT_DID_OPEN)
     def opened(params: lsp.DidOpenTextDocumentParams) -> None:
         document = params.text_document
-        if document.language_id == "epicycle" and (path := path_of(document.uri)) is not None:
-            server.ours.add(path)
         server.change(document.uri, document.text, document.version)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)

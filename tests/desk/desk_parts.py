@@ -16,8 +16,13 @@ def folder_with_model(folder: Path) -> Path:
     return folder / NAME
 
 
-def place(text: str, before: str, behind: str = "") -> tuple[int, int]:
-    """Line and column, from 0, where one text ends and another begins; it must be there once."""
+def offset(text: str, before: str, behind: str = "") -> int:
+    """How many characters are before the place where one text ends and another begins; it must be there once."""
     assert text.count(before + behind) == 1, f"{text.count(before + behind)} times {before + behind!r}"
-    start = text[: text.index(before + behind) + len(before)]
+    return text.index(before + behind) + len(before)
+
+
+def place(text: str, before: str, behind: str = "") -> tuple[int, int]:
+    """The same as line and column, from 0."""
+    start = text[: offset(text, before, behind)]
     return start.count("\n"), len(start) - start.rfind("\n") - 1

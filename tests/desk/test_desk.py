@@ -20,7 +20,7 @@ from epicycle.runner.model.build.load import load_model
 from epicycle.runner.model.text.kinds import KINDS, Kind
 from epicycle.runner.model.text.problems import ModelError
 from tests.bad_models.test_bad_models import FOLDER
-from tests.desk.desk_parts import MODELS, NAME, folder_with_model, place
+from tests.desk.desk_parts import MODELS, NAME, folder_with_model, offset
 from tests.desk.kinds_page import example
 
 SMALL = """model: two_bodies
@@ -176,15 +176,15 @@ COMPLETIONS = (
 @pytest.mark.parametrize(("old", "new", "expected"), COMPLETIONS, ids=[new for _, new, _ in COMPLETIONS])
 def test_completion(old: str, new: str, expected: dict[str, int], tmp_path: Path) -> None:
     path, text = tmp_path / "m.yaml", SMALL.replace(old, new, 1)
-    line, column = place(text, text[: text.index("|")], "|")
-    found = complete(path, line, column, {path.resolve(): text.replace("|", "", 1)})
+    here = offset(text, text[: text.index("|")], "|")
+    found = complete(path, here, {path.resolve(): text.replace("|", "", 1)})
     assert expected.items() <= {each.text: each.replaces for each in found}.items()
 
 
 def test_completion_says_what_a_path_matches(tmp_path: Path) -> None:
     path, text = tmp_path / "m.yaml", SMALL.replace('"*.trigger"', '"*."')
-    line, column = place(text, '"*.', '"')
-    found = {each.text: each.what for each in complete(path, line, column, {path.resolve(): text})}
+    here = offset(text, '"*.', '"')
+    found = {each.text: each.what for each in complete(path, here, {path.resolve(): text})}
     assert (found["trigger"], "left" in found) == ("matches 3 ports", False)  # nothing is *.left
 
 
@@ -194,7 +194,7 @@ def test_completion_knows_composites_and_what_they_declare(tmp_path: Path) -> No
 
     def found(before: str, written: str) -> set[str]:
         changed = text.replace(before, before + written, 1)
-        return {each.text for each in complete(path, *place(changed, before + written), {path.resolve(): changed})}
+        return {each.text for each in complete(path, offset(changed, before + written), {path.resolve(): changed})}
 
     assert {"patience: ", "vague: "} <= found("    type: Observer\n", "    pa")
     assert {"RadioRobot", "MobileRobot"} <= found("  base:\n    type: ", "")
@@ -204,10 +204,9 @@ def test_completion_knows_composites_and_what_they_declare(tmp_path: Path) -> No
 
 def test_a_place_in_a_broken_text_is_none_or_completed(tmp_path: Path) -> None:
     path = tmp_path / "m.yaml"
-    assert complete(path, 5, 0, {path.resolve(): "model: m"}) == []
-    assert "model: " in {each.text for each in complete(path, 0, 2, {path.resolve(): "mo"})}
-    assert "model: " in {each.text for each in complete(path, 0, 0, {path.resolve(): ""})}
-    assert complete(path, 0, 3, {path.resolve(): "\x00{{{"}) == []
+    assert "model: " in {each.text for each in complete(path, 2, {path.resolve(): "mo"})}
+    assert "model: " in {each.text for each in complete(path, 0, {path.resolve(): ""})}
+    assert complete(path, 3, {path.resolve(): "\x00{{{"}) == []
 
 
 # -- what stands there ------------------------------------------------------------------------------------------------
@@ -221,7 +220,7 @@ def test_hover(tmp_path: Path) -> None:
     knowledge = known(tmp_path / "m.yaml", SMALL)
 
     def said(before: str, behind: str) -> str:
-        return hover(knowledge, *place(SMALL, before, behind))
+        return hover(knowledge, offset(SMALL, before, behind))
 
     assert said("-> le", "ft.trigger") == (
         "**left**: actor, `CircularMotion`\n\n"
@@ -238,26 +237,26 @@ def test_hover(tmp_path: Path) -> None:
     assert said("-> left.trig", "ger").startswith("**trigger**: input of left, any: sends the state now")
     assert said("clock.out", "put -> left").startswith("**output**: output of clock, any: the values in turn")
     assert said("take: co", "unt").endswith("`count`: how many there are (tokens)")
-    assert hover(knowledge, 400, 0) == ""
+    assert hover(knowledge, len(SMALL)) == ""
 
 
 def test_definition_and_references(tmp_path: Path) -> None:
     path = folder_with_model(tmp_path)
     text = path.read_text(encoding="utf-8")
     knowledge = known(path)
-    (found,) = definition(knowledge, *place(text, 'at: "*.sen', 'sor.measurement"\n\nmonitors'))
+    (found,) = definition(knowledge, offset(text, 'at: "*.sen', 'sor.measurement"\n\nmonitors'))
     assert (Path(found.file).name, found.source.strip()[:7]) == ("mobile_robot.yaml", "sensor:")
-    (found,) = definition(knowledge, *place(text, "  observer:\n    type: Obs", "erver\n"))
+    (found,) = definition(knowledge, offset(text, "  observer:\n    type: Obs", "erver\n"))
     assert (Path(found.file).name, found.source) == (NAME, "  Observer:")
-    (found,) = definition(knowledge, *place(text, "include: robots/mob", "ile"))
+    (found,) = definition(knowledge, offset(text, "include: robots/mob", "ile"))
     assert Path(found.file).name == "mobile_robot.yaml"
     assert [(at.source, at.column, at.length, path.name) for at, path in links(knowledge)] == [
         ("include: robots/mobile_robot.yaml", 10, 24, "mobile_robot.yaml")
     ]
-    lines = [each.line for each in references(knowledge, *place(text, "  con", "tact:\n    type"))]
+    lines = [each.line for each in references(knowledge, offset(text, "  con", "tact:\n    type"))]
     written = [number for number, line in enumerate(text.splitlines(), 1) if "contact." in line]
     assert sorted(set(lines)) == sorted({*written, text.splitlines().index("  contact:") + 1})
-    assert definition(knowledge, 0, 0) == references(knowledge, 0, 0) == []
+    assert definition(knowledge, 0) == references(knowledge, 0) == []
 
 
 def test_links_lead_to_the_files_that_are_named(tmp_path: Path) -> None:
@@ -311,7 +310,7 @@ def test_rename(before: str, behind: str, new: str, count: dict[str, int], tmp_p
     path = folder_with_model(tmp_path)
     text = path.read_text(encoding="utf-8")
     knowledge = known(path)
-    edits = rename(knowledge, *place(text, before, behind), new)
+    edits = rename(knowledge, offset(text, before, behind), new)
     for file, changed in texts_after(knowledge.reading, edits).items():
         file.write_text(changed, encoding="utf-8")
     after = load_model(path)
@@ -334,7 +333,7 @@ def test_rename(before: str, behind: str, new: str, count: dict[str, int], tmp_p
 )
 def test_a_name_that_cannot_be_changed(before: str, behind: str, new: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(RenameError, match=f"^{message}$"):
-        rename(known(tmp_path / "m.yaml", SMALL), *place(SMALL, before, behind), new)
+        rename(known(tmp_path / "m.yaml", SMALL), offset(SMALL, before, behind), new)
 
 
 def test_a_name_that_a_pattern_shares_is_not_changed(tmp_path: Path) -> None:
@@ -350,9 +349,9 @@ run: {stop: 2 s}
     path = tmp_path / "m.yaml"
     knowledge = known(path, text)
     assert knowledge.reading.problems == ()
-    line, column = place(text, "A: {inputs: [go], actors: {si", "nk")
+    here = offset(text, "A: {inputs: [go], actors: {si", "nk")
     with pytest.raises(RenameError) as found:
-        rename(knowledge, line, column, "end", {path.resolve(): text})
+        rename(knowledge, here, "end", {path.resolve(): text})
     assert str(found.value) == (
         f"{path}:7:61: the name stands for several things: actor 'sink' of A and actor 'sink' of B; change it by hand"
     )

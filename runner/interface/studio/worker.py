@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -132,9 +133,7 @@ class Worker(processes.Worker):
 
     def edit(self, asked: Message) -> Message:
         """A change of the model: the changes of the text that make it."""
-        what, given = str(asked["what"]), asked["given"]
-        if not isinstance(given, list) or not all(isinstance(each, (str, bool, dict)) for each in given):
-            raise EpicycleError("this change cannot be read")
+        what, given = str(asked["what"]), _listed(asked["given"], str, bool, dict)
         if what not in editing.CHANGES:
             raise EpicycleError("there is no such change")
         if what in ("connect", "disconnect"):
@@ -198,7 +197,7 @@ class Worker(processes.Worker):
         """Both futures of the model's run, as data of a page, if they differ."""
         time_, microstep = asked["at"]
         until = asked.get("until")
-        changes = Changes(**{key: _texts(asked.get(key, [])) for key in ("change", "remove", "let_through", "lose")})
+        changes = Changes(*(_listed(asked.get(each.name, []), str) for each in fields(Changes)))
         model = named(self.model, RunSpec(str(self.path), types=self.files))
         try:
             with opened(self.answers.texts):
@@ -218,8 +217,8 @@ class Worker(processes.Worker):
         return {"sentence": found.sentence, "view": view}
 
 
-def _texts(given: Any) -> list[str]:
-    if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
+def _listed(given: Any, *kinds: type) -> list[Any]:
+    if not isinstance(given, list) or not all(isinstance(each, kinds) for each in given):
         raise EpicycleError("this change cannot be read")
     return given
 
