@@ -84,17 +84,12 @@ def remove(data: Any, section: str, name: str) -> None:
     if name not in (parts := _section(data, section, {})):
         raise EditError(f"there is no {path(section, name)} in this text")
     del parts[name]
-    is_end = re.compile(rf"\A{re.escape(name)}(?:\[.*\])?\.")
-    # One at a time, because an item may make several.
-    while section == "actors" and (
-        ends := [
-            pair
-            for _, pairs in _connections(_section(data, "connections", []))
-            for pair in pairs
-            if any(map(is_end.match, pair))
-        ]
-    ):
-        disconnect(data, *ends[0])
+    if section == "actors":
+        is_end = re.compile(rf"\A{re.escape(name)}(?:\[.*\])?\.")
+        ends = [pair for _, pairs in _connections(_section(data, "connections", [])) for pair in pairs]
+        for pair in ends:
+            if any(map(is_end.match, pair)):
+                disconnect(data, *pair)
 
 
 def set_parameter(data: Any, section: str, name: str, parameter: str, said: str) -> None:

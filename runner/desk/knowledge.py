@@ -50,10 +50,7 @@ class Knowledge:
         known = reading.files.items()
         self.path = (reading.path if file is None else file).resolve()
         self.file = next((name for name, (path, _) in known if path.resolve() == self.path), reading.name)
-
-    @property
-    def text(self) -> str:
-        return self.reading.files[self.file][1] if self.file in self.reading.files else ""
+        self.text = reading.files[self.file][1] if self.file in reading.files else ""
 
     def stretch(self, at: Position) -> tuple[Path, int, int]:
         """A position as a file and a stretch of characters."""

@@ -2,48 +2,16 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from epicycle.runner.desk import Knowledge, controls, difference, editing, read
 from epicycle.runner.desk.changes import apply, edits_between
-from epicycle.runner.desk.parts import EditError, data_of, rendered, typed
+from epicycle.runner.desk.parts import data_of
 from epicycle.runner.model.catalogue.packaged import packaged_models
+from tests.desk.editing_parts import FLOW, TEXT, Act, set_value
 
-TEXT = """# A line of robots.
-model: two_bodies   # its name
-
-parameters:
-  loss: {value: 0.2, min: 0, max: 1, doc: probability that a tick is lost}  # set by hand
-actors:
-  # The first of all.
-  clock: {type: Clock, period: 500 ms}
-  left: {type: CircularMotion, start: [0, 1]}    # on the left
-  right:
-    type: CircularMotion
-    start: [0, -1]   # below
-
-connections:
-- clock.output -> left.trigger   # at once
-# late
-- {from: clock.output, to: right.trigger, delay: 100 ms}
-
-aspects:
-  lossy: {type: PacketLoss, probability: "${loss}", at: "*.trigger"}  # now and then
-  # the end of aspects
-run: {stop: 10 s, seed: 1, record: [left.state, right.state]}
-metrics:
-  heard: {of: left.state, take: count}
-# the end
-"""
-FLOW = (
-    "{model: flow, parameters: {a: 1, b}, actors: {\n  clock: {type: Clock, period: 1 s}, # ticks\n"
-    "  gain: {type: Scale, factor: 2},\n  sum: {type: Merge} # all\n  },\n"
-    ' connections: [clock.output -> gain.input, "gain.output -> sum.input"], run: {stop: 3 s}}\n'
-)
 COMPOSITE = """model: inside
 composites:
   Pair:
@@ -59,7 +27,6 @@ actors:
 connections: [clock.output -> pair.tick]
 run: {stop: 3 s}
 """
-Act = Callable[[str], str]
 
 
 def knowledge(text: str, folder: Path) -> Knowledge:
@@ -73,15 +40,6 @@ def changes(before: str, after: str, folder: Path) -> list[str]:
     assert one is not None
     assert other is not None
     return [str(each) for each in difference(one, other).changes]
-
-
-def set_value(text: str, keys: tuple[str, ...], said: str) -> str:
-    """A text with a value, as somebody types it, in the place of another, or behind the others if there is none."""
-    data = holder = data_of(text)
-    for key in keys[:-1]:
-        holder = holder[key]
-    holder[keys[-1]] = typed(said)
-    return rendered(text, data)
 
 
 def lines(before: str, after: str) -> tuple[list[str], list[str]]:
@@ -314,161 +272,9 @@ def test_switching_off_and_on_leaves_a_packaged_model_as_it_was(name: str) -> No
         assert editing.change(new, "remove", "", "actors", f"{actor}_twin") == text
 
 
-# -- what is refused, and what cannot get in --------------------------------------------------------------------------
-
-HOSTILE = (
-    "x: 1",
-    "x}, evil: {type: Process",
-    "x\nevil: {type: Process}",
-    "x\u2028evil: 1",
-    "- a",
-    "&a x",
-    "*a",
-    "!!python/object:os.system x",
-    "# gone",
-    "x # gone",
-    "x #gone",
-    '"',
-    "'",
-    "'}, evil: 1",
-    "[",
-    "]",
-    "{{",
-    "${",
-    "${__import__('os')}",
-    "| x",
-    "> x",
-    "% x",
-    "@x",
-    "`x`",
-    "---",
-    "...",
-    "<<",
-    "\x00",
-    "\x85",
-    "\ufeff",
-    "\U0001f600",
-    "true",
-    "null",
-    "1e5",
-    "0x10",
-    "",
-    " ",
-    "a, b",
-    "a: ",
-    "? a",
-    "\\",
-    "\\n",
-)
-
-
-@pytest.mark.parametrize("said", HOSTILE)
-@pytest.mark.parametrize("text", [TEXT, FLOW], ids=["lines", "brackets"])
-def test_a_value_stays_one_value(said: str, text: str) -> None:
-    before = data_of(text)
-    for keys in (("run", "stop"), ("run", "extra"), ("actors", "clock", "period"), ("actors", "clock", "extra")):
-        data = data_of(set_value(text, keys, said))
-        holder, old = data, before
-        for key in keys[:-1]:
-            holder, old = holder[key], old[key]
-        new = holder.pop(keys[-1])
-        assert isinstance(new, (str, int, float, bool, type(None)))
-        assert new == said.strip() or not isinstance(new, str)
-        assert {key: each for key, each in old.items() if key != keys[-1]} == holder
-        assert data.keys() == before.keys()
-
-
-@pytest.mark.parametrize("said", HOSTILE)
-def test_a_name_is_a_name(said: str) -> None:
-    acts: dict[str, Act] = {
-        "is not a name: use letters, digits and _, and no digit first": lambda text: editing.change(
-            text, "add_part", "", "actors", said, "Clock", {}
-        ),
-        "is not the name of a type": lambda text: editing.change(text, "add_part", "", "actors", "new", said, {}),
-        "is not a port: write actor.port, or a port of the composite": lambda text: editing.change(
-            text, "connect", "", f"clock.{said}", "left.trigger"
-        ),
-    }
-    for message, act in acts.items():
-        if said in ("true", "null") and act is not acts["is not a name: use letters, digits and _, and no digit first"]:
-            continue  # which might be those of a type and of a port
-        if said in ("true", "null"):
-            assert data_of(act(TEXT))["actors"][said] == {"type": "Clock"}
-            continue
-        with pytest.raises(EditError, match=re.escape(message)):
-            act(TEXT)
-
-
-@pytest.mark.parametrize(
-    ("act", "message"),
-    [
-        (
-            lambda text: editing.change(text, "disconnect", "", "a.b", "c.d"),
-            "there is no connection a.b -> c.d in this text",
-        ),
-        (lambda text: editing.change(text, "remove", "", "aspects", "none"), "there is no aspects.none in this text"),
-        (
-            lambda text: editing.change(text, "set_parameter", "", "actors", "none", "x", "1"),
-            "there is no actors.none in this text",
-        ),
-        (
-            lambda text: editing.change(text, "add_part", "", "actors", "clock", "Clock", {}),
-            "there is already 'clock' among the actors",
-        ),
-        (
-            lambda text: editing.change(text, "connect", "None", "a.b", "c.d"),
-            "there is no composites.None in this text",
-        ),
-        (
-            lambda text: editing.change(text, "drop_in", "", "model: x"),
-            "this is not a disturbance that consists of parameters, values and aspects only",
-        ),
-        (
-            lambda text: editing.change(text + "x: [", "connect", "", "a.b", "c.d"),
-            "this can be changed once the text can be read: broken YAML: did not find expected node content",
-        ),
-    ],
-)
-def test_what_cannot_be_changed_is_said(act: Act, message: str) -> None:
-    with pytest.raises(EditError) as caught:
-        act(TEXT)
-    assert str(caught.value) == message
-
-
-def test_an_alias_is_left_to_its_author() -> None:
-    text = "model: x\nactors:\n  a: {type: Clock, period: &p 1 s}\n  b: {type: Clock, period: *p}\n"
-    with pytest.raises(EditError) as caught:
-        editing.change(text, "set_parameter", "", "actors", "b", "period", "2 s")
-    assert str(caught.value) == "actors.b.period is an alias: change it by hand"
-    with pytest.raises(EditError) as caught:
-        editing.change(text, "set_parameter", "", "actors", "a", "period", "2 s")
-    assert str(caught.value) == ("this text is written in a way that no program can change here: change it by hand")
-
-
 def test_bounds_are_numbers_in_the_unit_of_the_parameter(tmp_path: Path) -> None:
     text = "model: m\nparameters: {pace: {value: 1 min, min: 500 ms, max: 0.1 h}}\n"
     text += 'actors: {clock: {type: Clock, period: "${pace}"}}\nrun: {stop: 1 h}\n'
     path = tmp_path / "m.yaml"
     (field,) = controls.parameters(Knowledge(read(path, {path.resolve(): text})))
     assert (field["low"], field["high"], field["number"], field["unit"]) == (0.5, 360.0, 60.0, "s")
-
-
-@pytest.mark.parametrize(
-    "act",
-    [
-        lambda text: editing.change(text, "remove", "", "actors", "a"),
-        lambda text: editing.change(text, "remove", "", "aspects", "a"),
-        lambda text: editing.change(text, "switch", "", "a", False),
-        lambda text: editing.change(text, "switch", "", "a", True),
-        lambda text: editing.change(text, "add_part", "", "actors", "b", "Clock", {}),
-        lambda text: editing.change(text, "add_part", "", "aspects", "b", "PacketLoss", {"at": "a.b"}),
-        lambda text: editing.change(text, "connect", "", "a.b", "c.d"),
-        lambda text: editing.change(text, "disconnect", "", "a.b", "c.d"),
-        lambda text: editing.change(text, "set_parameter", "", "actors", "a", "period", "1 s"),
-        lambda text: editing.change("model: m\n", "drop_in", "", text),
-    ],
-)
-@pytest.mark.parametrize("text", ["model: m\nactors: {a: {type: Clock\n", "a: 1\na: 2\n", "\x00", "a: *b\n", "[" * 500])
-def test_a_text_that_cannot_be_read_is_not_changed(act: Callable[[str], str], text: str) -> None:
-    with pytest.raises(EditError):
-        act(text)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.show.conftest import browser
-from tests.studio.studio_parts import PATIENCE, Writer, served
+from tests.studio.studio_parts import MODEL, PATIENCE, Served, Writer, served
 
 __all__ = ["browser"]
 
@@ -40,3 +40,12 @@ def studio(browser: Any) -> Iterator[Callable[..., Writer]]:
         yield open_model
         assert said == []
         assert [url for url in asked if not url.startswith((*origins, "data:"))] == []
+
+
+@pytest.fixture(scope="module")
+def studio_at(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Served, Path]]:
+    """A studio of a small model, and the model's file."""
+    path = tmp_path_factory.mktemp("studio") / "safe.yaml"
+    path.write_text(MODEL)
+    with served(path, "--seconds", "30", "--events", "20000") as found:
+        yield found, path

@@ -15,6 +15,14 @@ import httpx
 from websockets.sync.client import ClientConnection, connect
 
 PATIENCE = 60  # seconds
+MODEL = """model: safe  # mine
+actors:
+  clock: {type: Clock, period: 1 s}
+  gain: {type: Scale, factor: 2}
+connections: [clock.output -> gain.input]
+run: {stop: 10 s, record: gain.output}
+metrics: {seen: {of: gain.output, take: count}}
+"""
 
 
 class Served(NamedTuple):

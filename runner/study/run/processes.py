@@ -99,8 +99,10 @@ class Processes:
         with self._guard:
             if self._is_over:
                 raise UnwantedError
-            if self._idle:
-                return self._idle.pop()
+            while self._idle:
+                if not (found := self._idle.pop()).is_over:
+                    return found
+                self._all.discard(found)
             found = Process(self._begin, *self._arguments)
             self._all.add(found)
         return found
