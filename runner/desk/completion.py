@@ -121,7 +121,7 @@ def _ends(owner: str, keys: list[str], before: str, knowledge: Knowledge) -> Ite
 def _types(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Known]:
     if keys == ("extends",) or (len(keys) == 3 and keys[0] in ("actors", "aspects")):
         for name in knowledge.names.classes:
-            if name and (name != owner or len(keys) == 3):
+            if name not in ("", owner):
                 yield Known(name, "type", "composite", knowledge.of_type(name, "actors"), len(before))
     yield from _chosen(place, knowledge, "type")
 

@@ -65,7 +65,9 @@ class Knowledge:
 
     def use_at(self, offset: int) -> Use | None:
         """The use of a name at a place in the file."""
-        return next((use for use in self.names.uses if self.covers(use.position, offset)), None)
+        line = positions(self.text).place(offset)[0] + 1
+        here = (each for each in self.names.uses if each.position.line == line)
+        return next((each for each in here if self.covers(each.position, offset)), None)
 
     @cached_property
     def catalogue(self) -> Catalogue:
