@@ -15,10 +15,9 @@ from .core import (
     array_parameter,
     counted,
     elementary,
-    laws,
     token_type,
 )
-from .core.choices import cumulated, weighted
+from .core.choices import cumulated
 
 
 class Distribution(Configurable):
@@ -60,7 +59,7 @@ class Uniform(Distribution):
         _check_order("low", self.low, "high", self.high)
 
     def draw(self, random: Stream) -> float:
-        return laws.uniform(random, self.low, self.high)
+        return random.uniform(self.low, self.high)
 
 
 class Normal(Distribution):
@@ -70,7 +69,7 @@ class Normal(Distribution):
     standard_deviation = Parameter(float, 1.0, min=0, doc="the square root of the variance")
 
     def draw(self, random: Stream) -> float:
-        return laws.normal(random, self.mean, self.standard_deviation)
+        return random.normal(self.mean, self.standard_deviation)
 
 
 class LogNormal(Distribution):
@@ -80,7 +79,7 @@ class LogNormal(Distribution):
     sigma = Parameter(float, 1.0, unit="1", min=0, doc="standard deviation of the logarithm")
 
     def draw(self, random: Stream) -> float:
-        return self.median * laws.lognormal(random, 0.0, self.sigma)
+        return self.median * random.lognormal(0.0, self.sigma)
 
 
 class Exponential(Distribution):
@@ -93,7 +92,7 @@ class Exponential(Distribution):
     mean = Parameter(float, 1.0, min=0, doc="the mean, 1 / rate")
 
     def draw(self, random: Stream) -> float:
-        return laws.exponential(random, self.mean)
+        return random.exponential(self.mean)
 
 
 class Gamma(Distribution):
@@ -103,7 +102,7 @@ class Gamma(Distribution):
     mean = Parameter(float, 1.0, min=0, doc="the mean, shape * scale")
 
     def draw(self, random: Stream) -> float:
-        return laws.gamma(random, self.shape, self.mean / self.shape)
+        return random.gamma(self.shape, self.mean / self.shape)
 
 
 class ChiSquare(Distribution):
@@ -112,7 +111,7 @@ class ChiSquare(Distribution):
     freedom = Parameter(float, unit="1", min=1, doc="degrees of freedom, the number of squares")
 
     def draw(self, random: Stream) -> float:
-        return laws.chisquare(random, self.freedom)
+        return random.chisquare(self.freedom)
 
 
 class StudentT(Distribution):
@@ -122,7 +121,7 @@ class StudentT(Distribution):
     freedom = Parameter(float, unit="1", min=0.1, doc="degrees of freedom")
 
     def draw(self, random: Stream) -> float:
-        return laws.standard_t(random, self.freedom)
+        return random.standard_t(self.freedom)
 
 
 class Cauchy(Distribution):
@@ -136,8 +135,8 @@ class Cauchy(Distribution):
 
     def draw(self, random: Stream) -> float:
         if self.cut is None:
-            return self.median + self.scale * laws.standard_cauchy(random)
-        angle = laws.uniform(random, -1.0, 1.0) * elementary.atan(self.cut / self.scale)
+            return self.median + self.scale * random.standard_cauchy()
+        angle = random.uniform(-1.0, 1.0) * elementary.atan(self.cut / self.scale)
         return self.median + self.scale * elementary.tan(angle)
 
 
@@ -148,7 +147,7 @@ class VonMises(Distribution):
     concentration = Parameter(float, 1.0, unit="1", above=0, doc="kappa; if large, about 1 / variance")
 
     def draw(self, random: Stream) -> float:
-        return laws.vonmises(random, self.mean, self.concentration)
+        return random.vonmises(self.mean, self.concentration)
 
 
 class Poisson(Distribution):
@@ -159,7 +158,7 @@ class Poisson(Distribution):
     mean = Parameter(float, 1.0, unit="1", above=0, max=1e18, doc="the mean")
 
     def draw(self, random: Stream) -> int:
-        return laws.poisson(random, self.mean)
+        return random.poisson(self.mean)
 
 
 class Binomial(Distribution):
@@ -171,7 +170,7 @@ class Binomial(Distribution):
     probability = Parameter(float, 0.5, unit="1", min=0, max=1, doc="probability of success in each trial")
 
     def draw(self, random: Stream) -> int:
-        return laws.binomial(random, self.trials, self.probability)
+        return random.binomial(self.trials, self.probability)
 
 
 class NegativeBinomial(Distribution):
@@ -183,7 +182,7 @@ class NegativeBinomial(Distribution):
     probability = Parameter(float, 0.5, unit="1", above=0, max=1, doc="probability of success in each trial")
 
     def draw(self, random: Stream) -> int:
-        return laws.negative_binomial(random, self.successes, self.probability)
+        return random.negative_binomial(self.successes, self.probability)
 
 
 class Triangular(Distribution):
@@ -198,7 +197,7 @@ class Triangular(Distribution):
         _check_order("mode", self.mode, "high", self.high)
 
     def draw(self, random: Stream) -> float:
-        return laws.triangular(random, self.low, self.mode, self.high)
+        return random.triangular(self.low, self.mode, self.high)
 
 
 class Bernoulli(Distribution):
@@ -250,7 +249,7 @@ class Choice(Distribution):
             )
 
     def draw(self, random: Stream) -> Any:
-        return self.values[weighted(random, self._sums)]
+        return self.values[random.weighted(self._sums)]
 
 
 def _check_order(low_name: str, low: float, high_name: str, high: float) -> None:
