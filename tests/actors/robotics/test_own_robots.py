@@ -13,6 +13,7 @@ import pytest
 from epicycle.actors import (
     Barrier,
     BodyState,
+    Dynamics,
     Estimate,
     ExtendedEstimator,
     FilterPyEstimator,
@@ -131,6 +132,19 @@ def test_a_car_arrives_and_others_know_where_it_goes(folder: Path) -> None:
         then = round(10 * plan.time)
         assert ahead[0] == pytest.approx(states[then + 1].position, abs=1e-9)
         assert ahead[1] == pytest.approx(states[then + 2].position, abs=0.1)
+
+
+class _Sliding(Dynamics):
+    """Says no more of itself than how it moves."""
+
+    def step(self, state: Any, control: Any, period: float) -> Any:
+        x, y, vx, vy = state
+        return [x + period * vx, y + period * vy, vx + period * control[0], vy + period * control[1]]
+
+
+def test_a_velocity_is_what_follows_the_position_unless_it_is_said() -> None:
+    body = _Sliding().body([1.0, 2.0, 3.0, 4.0], 0.5)
+    assert (body.position.tolist(), body.velocity.tolist(), body.time) == ([1.0, 2.0], [3.0, 4.0], 0.5)
 
 
 def test_the_car_from_the_command_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -51,6 +51,12 @@ def test_who_stands_where_at_the_start_may_be_known_before_a_plan_comes() -> Non
     assert peers(0.5, plan("c", 0.5, y=9.0))[0] == [[20.0, -1.0], [20.0, -3.0], [20.0, 9.0]]
 
 
+def test_a_first_plan_takes_the_place_of_the_nearest() -> None:
+    harness, recorder = make(peers_at_start=[[20.0, 2.0], [2.0, 20.0]])
+    harness.fire(0.0, trigger=0, state=state(), peer_plans=[plan("b", 0.0, x=3.0, y=19.0)])
+    assert recorder.records[-1][0].peer_mean[:, 0].tolist() == [[20.0, 2.0], [3.0, 19.0]]
+
+
 def test_a_robot_is_none_of_those_who_stand_somewhere_at_the_start() -> None:
     harness, recorder = make(start=[20.0, -2.0], peers_at_start=[[20.0, 2.0], [20.0, -2.0], [30.0, 0.0]])
     harness.fire(0.0, trigger=0, state=state())
