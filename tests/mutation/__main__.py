@@ -35,17 +35,22 @@ from tests.mutation.mutants import KERNELS, Mutant
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / ".mutants"
 # What has to do with compiling is tried with numba, and everything is compiled anew.
-COMPILERS = {"actors/robotics/numerics/jit.py", "actors/core/elementary/in_numba.py"}
+COMPILERS = {
+    "actors/core/elementary/in_numba.py",
+    *(f"actors/robotics/numerics/{name}.py" for name in ("compiled", "entry", "jit", "kept", "warm_up")),
+}
 COMPILING = 120.0  # s, at most
 # Those that run the guarded folders in this process.
 TESTS = (
-    "tests/actors", "tests/api", "tests/aspects", "tests/catalogue", "tests/commands/test_output.py",
+    "tests/actors", "tests/api", "tests/aspects", "tests/bad_models", "tests/bridges/test_attached.py",
+    "tests/bridges/test_processes.py", "tests/catalogue", "tests/commands/test_output.py",
     "tests/conformance", "tests/engine", "tests/language", "tests/model", "tests/modes", "tests/results",
     "tests/temporal", "tests/text", "tests/test_models.py", "tests/test_reference.py",
 )  # fmt: skip
 TESTS_OF_KERNELS = ("tests/actors",)
 LONGEST = {True: 6.0, False: 4.0}  # s; a test that takes longer, compiled or not, is not asked
-STAGES = ((25, 1.5), (100, 3.0), (300, 5.0))  # so many tests, of so many seconds together; each the next ones
+# So many tests, of so many seconds together; each the next ones.
+STAGES = ((25, 1.5), (100, 3.0), (300, 5.0), (600, 15.0))
 
 
 class Result(NamedTuple):
@@ -149,7 +154,8 @@ def attempt(mutant: Mutant, tree: Path, by_kind: dict[bool, recorder.Map], but: 
     original = path.read_text(encoding="utf-8")
     stat = path.stat()
     compiled = is_compiled(mutant)
-    patience = 8.0 + COMPILING * (mutant.file in COMPILERS)
+    anew = mutant.file in COMPILERS
+    patience = 8.0 + COMPILING * anew
     known = by_kind[compiled]
     tests = [test for test in known.tests(mutant.file, original, mutant.line) if test not in but]
     before, after = mutant.lines(original)
@@ -158,7 +164,7 @@ def attempt(mutant: Mutant, tree: Path, by_kind: dict[bool, recorder.Map], but: 
     try:
         for heap, total in stages(tests, known.seconds):
             asked += len(heap)
-            verdict = trial.run_tests(tree, heap, compiled, 3.0 * total + patience)
+            verdict = trial.run_tests(tree, heap, compiled, 3.0 * total + patience, anew)
             spent += verdict.seconds
             if not verdict.passed:
                 break
@@ -287,14 +293,14 @@ def main() -> int:
     scratch = Path(tempfile.mkdtemp(prefix="epicycle-mutants-"))
     try:
         trees = [trial.copy_project(ROOT, scratch / str(number)) for number in range(given.jobs)]
+        with multiprocessing.get_context("fork").Pool(given.jobs) as pool:
+            pool.map(warm_up, trees)
         if given.map is not None and given.map.is_file():
             found = recorder.load(given.map)
         else:
             found = maps(trees, given.jobs)
             if given.map is not None:
                 recorder.save(given.map, found)
-        with multiprocessing.get_context("fork").Pool(given.jobs) as pool:
-            pool.map(warm_up, trees)
         by_kind = {compiled: recorder.Map(each) for compiled, each in found.items()}
         print(f"{len(found[True])} tests, {len(found[False])} of kernels; {time.monotonic() - began:.0f} s", flush=True)
         results: dict[Mutant, Result] = {}

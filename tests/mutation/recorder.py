@@ -6,8 +6,9 @@ import ast
 import json
 import signal
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -104,9 +105,10 @@ class Map:
         folder = file.rpartition("/")[0]
         near = {test for other, tests in self._files.items() if other.rpartition("/")[0] == folder for test in tests}
         levels.append(sorted(near, key=lambda test: (self.seconds[test], test)))
-        # Those of each level that know most of this file, then all others.
+        # Those of each level that know most of this file; then all others, and some of each file between them.
         first = [test for level in levels for test in level[:FEW]]
-        return list(dict.fromkeys([*first, *(test for level in levels for test in level)]))
+        others = (test for level in levels for pair in zip(level, in_turn(level), strict=True) for test in pair)
+        return list(dict.fromkeys([*first, *others]))
 
     def _key(self, test: str, file: str) -> tuple[bool, float, str]:
         return self.seconds[test] > 1.0, self._cost(test, file), test
@@ -133,6 +135,17 @@ class Map:
             if isinstance(node, ast.ClassDef | ast.FunctionDef):
                 yield list(range(node.lineno, (node.end_lineno or node.lineno) + 1))
         yield list(range(1, source.count("\n") + 2))
+
+
+def in_turn(tests: list[str]) -> list[str]:
+    """The first one of each file, then the second of each: of what all tests run, only some files are about it."""
+    counts = Counter[str]()
+    places = []
+    for test in tests:
+        file = test.partition("::")[0]
+        counts[file] += 1
+        places.append((counts[file], test))
+    return [test for _, test in sorted(places, key=itemgetter(0))]
 
 
 def save(path: Path, found: dict[bool, dict[str, Any]]) -> None:

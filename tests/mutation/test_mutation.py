@@ -64,6 +64,22 @@ def test_every_file_and_folder_that_is_named_is_there() -> None:
     assert [each for each in named if not (tool.ROOT / each).exists()] == []
 
 
+def test_a_change_that_python_does_not_see_is_none() -> None:
+    before = "limit = 9007199254740992.0\n"
+    assert [
+        mutants._is_another(Mutant("some.py", 1, 0, "some", 0, text), before)
+        for text in (before, "", "limit =\n", "limit = 1.0\n")
+    ] == [False, False, False, True]
+
+
+def test_every_survivor_is_a_change_of_a_line_that_there_is() -> None:
+    """A decorator that is left out has no line: that of what it decorates stands for it."""
+    kept = {
+        file: {line.strip() for line in (tool.ROOT / file).read_text("utf-8").splitlines()} for file, _, _ in argued()
+    }
+    assert [change for change in argued() if (change[1] or change[2]) not in kept[change[0]]] == []
+
+
 def test_a_sample_is_spread_over_all_places_and_the_same_each_time(project: Path) -> None:
     every = list(mutants.mutants_of(project))
     places = {mutant[:3] for mutant in every}
@@ -95,6 +111,12 @@ def test_tests_of_a_line_are_asked_until_one_fails(project: Path) -> None:
         "return value + 2 if value < limit else value": (True, test),
         "return 0 + 1": (False, ""),
     }
+
+
+def test_every_file_with_tests_of_a_line_is_asked_early() -> None:
+    assert recorder.in_turn(["a::1", "a::2", "a::3", "b::1", "c::1", "b::2"]) == [
+        "a::1", "b::1", "c::1", "a::2", "b::2", "a::3",
+    ]  # fmt: skip
 
 
 def test_heaps_of_tests_are_small_at_first() -> None:

@@ -54,8 +54,8 @@ def copy_project(root: Path, to: Path) -> Path:
         if (root / name).is_file():
             (to / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(root / name, to / name)
-    (to / "epicycle").mkdir()
-    for folder in ("actors", "aspects", "models", "ptolemy", "runner"):
+    shutil.copytree(to / "api", to / "epicycle")
+    for folder in ("actors", "aspects", "bridges", "models", "ptolemy", "runner"):
         (to / "epicycle" / folder).symlink_to(to / folder)
     return to
 
@@ -141,13 +141,15 @@ def _settle(tree: Path, compiled: bool, limit: float) -> None:
         os.dup2(silence, stream)
 
 
-def run_tests(tree: Path, tests: Sequence[str], compiled: bool, limit: float) -> Verdict:
-    """Run tests, one after the other, until one fails."""
+def run_tests(tree: Path, tests: Sequence[str], compiled: bool, limit: float, anew: bool = False) -> Verdict:
+    """Run tests, one after the other, until one fails; ``anew``: kernels are compiled first."""
     files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
     ordered = [test for file in files for test in tests if test.partition("::")[0] == file]
 
     def work() -> tuple[int, str]:
         sys.dont_write_bytecode = True
+        if anew:  # the first process would take them as Python
+            importlib.import_module("epicycle.actors.robotics.numerics.compiled").LEDGER.close()
         chosen = _Chosen(ordered)
         return int(pytest.main([*OPTIONS, "-x", *files], plugins=[chosen])), chosen.failed
 
