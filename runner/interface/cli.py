@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib import import_module
+from itertools import takewhile
 from typing import Any
 
 from ..support.collection import importing, seldom_collecting
@@ -89,10 +90,22 @@ class _Parser(argparse.ArgumentParser):
     """Refuses unknown options itself: otherwise the top one does, which does not tell those of a command."""
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        if self._subparsers is None:  # what follows a command is for its own parser
+            self._refuse_misspelt(takewhile(lambda each: each != "--", args or ()))
         options, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
         return options, unknown
+
+    def _refuse_misspelt(self, arguments: Iterable[str]) -> None:
+        """Tell what was meant by an option that is nearly one, before others are said to be missing."""
+        known = [option for option in self._option_string_actions if option.startswith("--")]
+        for name in (each.partition("=")[0] for each in arguments if each.startswith("--")):
+            if not any(option.startswith(name) for option in known):  # which may be shortened
+                from epicycle.actors import did_you_mean
+
+                if near := did_you_mean(name, known):
+                    self.error(f"unrecognized arguments: {name}{near}")
 
 
 def parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:

@@ -25,6 +25,20 @@ from epicycle.runner.interface.cli import main
             ),
         ),
         (
+            "status results --condition --jsn",
+            (
+                "usage: epicycle status [-h] [--conditions] [--json] [--debug] DIR\n"
+                "epicycle status: error: unrecognized arguments: --jsn, did you mean '--json'?\n"
+            ),
+        ),
+        (
+            "completion --debig=3",
+            (
+                "usage: epicycle completion [-h] [--debug] {bash,zsh,fish,tcsh,powershell}\n"
+                "epicycle completion: error: unrecognized arguments: --debig, did you mean '--debug'?\n"
+            ),
+        ),
+        (
             "recording fit link.csv and more",
             (
                 "usage: epicycle recording fit [-h] [--at PORTS] [--time COLUMN] [--lost COLUMN] [--received COLUMN] "
