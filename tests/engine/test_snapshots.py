@@ -211,9 +211,9 @@ def test_simulations_in_threads() -> None:
     assert [found[seed] for seed in range(4)] == alone
 
 
-def test_when_nothing_is_left_there_is_no_more_to_come() -> None:
-    simulation = Simulation(load("actors: {t: {type: Ticker, limit: 3}}"))
-    assert [simulation.advance(1.0), simulation.advance(5.0)] == [True, False]
+@pytest.mark.parametrize("more", ["", "run: {stop_when: [t.output]}"])
+def test_when_a_run_is_over_there_is_no_more_to_come(more: str) -> None:
+    assert not Simulation(load(f"actors: {{t: {{type: Ticker, limit: 3}}}}\n{more}")).advance(5.0)
 
 
 def test_a_run_in_pieces() -> None:

@@ -101,6 +101,12 @@ def test_a_whole_message(actor: type) -> None:
     assert str(caught.value) == (f"main.a.estimate got Estimate with 'covariance' of shape (6, 6); expected {expected}")
 
 
+def test_only_what_does_not_fit_is_named() -> None:
+    with pytest.raises(MessageError) as caught:
+        fire(RobustController, "state", BodyState((1.0, 2.0), (1.0, 2.0, 3.0), 0.0))
+    assert str(caught.value) == "main.a.state got BodyState with 'velocity' of shape (3,); expected (2,) in the plane"
+
+
 @pytest.mark.parametrize("actor", [Flying, RobustController])
 def test_an_estimate_in_space(actor: type) -> None:
     """It has process noise for six numbers."""

@@ -154,13 +154,17 @@ def test_times_for_all_actors_over_and_over(tmp_path: Path) -> None:
         (["signal,values", "slow@a,1"], "it has no column 'value'; columns: signal, values"),
         (["signal,value", "slow@a,-1"], "row 1: -1 is not a time in s >= 0"),
         (["value"], "it has no rows"),
+        ([], "No such file or directory"),
     ],
 )
 def test_files_that_tell_no_times(rows: list[str], reason: str, tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
     (tmp_path / "m.yaml").write_text("model: m\n" + CHAIN.format("type: ExecutionTime, times: t.csv, at: a"))
+    model = load_model(tmp_path / "m.yaml", types=TYPES)
+    if not rows:  # it has gone since
+        (tmp_path / "t.csv").unlink()
     with pytest.raises(ActorError) as caught:
-        Simulation(load_model(tmp_path / "m.yaml", types=TYPES)).run()
+        Simulation(model).run()
     assert str(caught.value).partition("\n")[0] == (
         f"aspect it failed in schedule() at a at (0 s, 1): the execution times in {tmp_path}/t.csv cannot be used: "
         f"{reason}"
