@@ -169,6 +169,18 @@ def test_a_track_is_confirmed_and_ends() -> None:
     assert harness.tokens("confirmed") == [len(each) for each in told]
 
 
+def test_between_scans_a_track_moves_on_and_spreads() -> None:
+    """As a Kalman filter predicts it, with the noise of one period for each."""
+    scans = [[scan((10.0, 0.1 * tick), time=tick / 10)] for tick in range(5)]
+    harness = track(*scans, [], [], position_noise=0.25, velocity_noise=0.5)
+    before, *after = (told.estimates[0] for told in harness.tokens("tracks")[4:])
+    mean, covariance, transition = before.mean, before.covariance, np.eye(4) + 0.1 * np.eye(4, k=2)
+    for each in after:
+        mean, covariance = transition @ mean, transition @ covariance @ transition.T + np.diag([0.25, 0.25, 0.5, 0.5])
+        assert each.mean == pytest.approx(mean)
+        assert each.covariance == pytest.approx(covariance)
+
+
 def test_two_hits_of_four_are_not_enough() -> None:
     """A detection, two misses and so on: with M = 3 of N = 4 nothing is ever confirmed; with M = 1, at once."""
     scans = [[scan(*([(10.0, 0.0)] if tick % 3 == 0 else []), time=tick / 10)] for tick in range(12)]
