@@ -121,6 +121,17 @@ def test_processes_are_fired_or_resumed() -> None:
     ]
 
 
+def test_a_process_that_is_resumed_after_a_release_is_not_released() -> None:
+    text = (
+        "actors: {t: {type: Ticker, limit: 1}, d: {type: Scale}, w: {type: Worker}}\n"
+        "connections: ['t.output -> d.input, w.input']\naspects: {hold: {type: Hold, at: d.output}}"
+    )
+    found = trace(text, 0.5, "d", "w", types=[Hold, Worker])
+    assert [(firing.tag.time * 4 / SECOND, firing.actor, firing.outside) for firing in found] == [
+        (0.0, "d", ""), (0.0, "w", ""), (1.0, "d", "released"), (2.0, "w", "resumed"),
+    ]  # fmt: skip
+
+
 def test_every_send_of_a_large_model_is_told_once() -> None:
     model = load_model("collision_avoidance", set=["observers=1", "disturbance=0.5"])
     found: list[Firing] = []
