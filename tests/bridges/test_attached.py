@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import simpy
 
-from epicycle.actors import Clock, EpicycleError, InputPort
+from epicycle.actors import Clock, EpicycleError, InputPort, Scale
 from epicycle.actors import Process as BaseProcess
 from epicycle.aspects import PacketLoss
 from epicycle.bridges import Process
@@ -48,6 +48,20 @@ def test_an_attached_run_is_the_run_that_it_is_alone() -> None:
     results = env.run(until=Simulation(ticking(stop=5.0)).attach(env))
     assert (results.digest, results.metrics, results.stopped) == (alone.digest, alone.metrics, "stop time")
     assert env.now == 5.0
+
+
+def test_all_microsteps_of_a_time_are_taken() -> None:
+    def delayed() -> Model:
+        model = Model("delayed", stop=0.5)
+        clock, first, second = (model.add(each) for each in (Clock("clock", period=0.1), Scale("a"), Scale("b")))
+        model.connect(clock.output, first.input, delay=0.0)
+        model.connect(first.output, second.input, delay=0.0)
+        return model
+
+    alone = Simulation(delayed()).run()
+    env = simpy.Environment()
+    results = env.run(until=Simulation(delayed()).attach(env))
+    assert (results.digest, results.events) == (alone.digest, 18)
 
 
 def iter_timeouts(env: Any, delay: float) -> Behaviour:
