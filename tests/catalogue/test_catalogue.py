@@ -18,6 +18,7 @@ import pytest
 
 from epicycle.runner.execution.engine import Simulation
 from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.catalogue.figure import own_figures
 from epicycle.runner.model.catalogue.like import dialects
 from epicycle.runner.model.catalogue.reference import TOPICS, describe, doc_of
 from epicycle.runner.model.catalogue.types import CatalogueError, Types, _offered, built_in, figure_types, installed
@@ -351,8 +352,8 @@ def test_third_party_package_installs_with_pip(tmp_path: Path) -> None:
 
 def test_every_type_of_epicycle_has_a_topic_and_every_topic_a_type() -> None:
     types = built_in()
-    groups = {describe(name, cls).group for known in (types.actors, types.aspects) for name, cls in known.items()}
-    assert groups == {*TOPICS}
+    every = (types.actors, types.aspects, own_figures())
+    assert {describe(name, cls).group for known in every for name, cls in known.items()} == {*TOPICS}
 
 
 def test_a_docstring_that_is_no_text() -> None:

@@ -51,7 +51,8 @@ def test_a_step_begins_with_its_slope(random: np.random.Generator, mu: float) ->
     zero = (0.0, 0.0)
     for _ in range(10):
         problem = inform_problem(random)._replace(max_speed=1e3, max_acceleration=1e3)
-        posed = task.new_task(problem, 10, 10, np.inf, np.zeros(task.room_for(problem, 10, 2)), zero)
+        room = np.zeros(task.room_for(problem, 10, 2))  # so that all bounds are 0
+        posed = task.new_task(problem, 10, 10, np.inf, room, zero)
         moved(posed, 0.0, mu)
         slope = newton.newton_step(posed.stages, posed.period, posed.free, zero)
         difference = moved(posed, 1e-6, mu) - moved(posed, -1e-6, mu)
