@@ -6,8 +6,9 @@ import json
 import re
 import subprocess
 import sys
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -249,6 +250,34 @@ def test_what_no_process_can_be_given(folder: Path, words: list[str], message: s
     with pytest.raises(ToolError) as raised:
         LimitedCall(folder).call("run", words[:1], *words[1:])
     assert str(raised.value) == message
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_nothing_goes_on_after_its_time(folder: Path) -> None:
+    endless = [
+        "--until=9e8",
+        "--set",
+        "clock.period=1 us",
+        "--vary=lossy.probability=0.1",
+        "--vary=lossy.probability=0.2",
+    ]
+    with pytest.raises(ToolError) as raised:
+        LimitedCall(folder, seconds=6.0).call("compare", ["line.yaml"], *endless)
+    assert str(raised.value).startswith("it was ended after 6 s")
+    assert Path.cwd() in places()
+    since = time.monotonic()
+    while folder.resolve() in places():  # its processes see that nobody is there any more
+        assert time.monotonic() - since < 10.0
+        time.sleep(0.05)
+
+
+def places() -> list[Path]:
+    """The working directories of all processes."""
+    found = []
+    for each in Path("/proc").glob("[0-9]*/cwd"):
+        with suppress(OSError):
+            found.append(each.readlink())
+    return found
 
 
 @pytest.mark.slow
