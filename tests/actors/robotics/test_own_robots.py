@@ -327,7 +327,10 @@ def test_a_flying_body_without_a_height_to_stay_above() -> None:
 # --- the protocols and the kernels ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("objective", [ReachGoal(goal=(3, 4)), StayNear(to={"b": 2.0, "target": 1.0}), Inform()])
+@pytest.mark.parametrize(
+    "objective",
+    [ReachGoal(goal=(3, 4)), StayNear(to={"b": 2.0, "target": 1.0}), Inform(), Inform(across=9.0)],
+)
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_a_problem_is_what_the_kernels_solve(objective: Any, dimensions: int, random: np.random.Generator) -> None:
     """What they report of a plan is what dynamics and objective say of it."""
