@@ -13,22 +13,9 @@ from functools import lru_cache
 from typing import ParamSpec, TypeVar
 
 from ..core import Quantity, UnitError, cut, did_you_mean, nearest
+from .budget import MAX_ELEMENTS, MAX_TEXT, Budget, BudgetError
 from .syntax import ExpressionError, free_names, parse, targets
-from .values import (
-    BINARY,
-    COMPARE,
-    CONSTANTS,
-    FUNCTIONS,
-    MAX_ELEMENTS,
-    MAX_TEXT,
-    UNARY,
-    Budget,
-    BudgetError,
-    check_result,
-    kind_of,
-    subscript,
-    text_of,
-)
+from .values import BINARY, COMPARE, CONSTANTS, FUNCTIONS, UNARY, check_result, kind_of, subscript, text_of
 
 _MAX_NAMES_SHOWN = 20
 

@@ -15,19 +15,9 @@ from typing import Any, Final, NoReturn
 import numpy as np
 
 from ..core import MAX_DEPTH, UnitError
+from .budget import MAX_ELEMENTS, MAX_TEXT, BudgetError, size_of
 from .tokens import operand
-from .values import (
-    BINARY,
-    COMPARE,
-    MAX_ELEMENTS,
-    MAX_INT,
-    MAX_TEXT,
-    UNARY,
-    BudgetError,
-    check_result,
-    size_of,
-    subscript,
-)
+from .values import BINARY, COMPARE, MAX_INT, UNARY, check_result, subscript
 
 UNDECIDED: Final = (ArithmeticError, BudgetError, LookupError, TypeError, UnitError, ValueError)
 NUMBERS: Final = frozenset({float, int})

@@ -8,12 +8,10 @@ import operator
 from collections.abc import Callable
 from typing import Any, Final
 
-from ..core import MAX_DEPTH, Quantity, counted, did_you_mean, elementary
+from ..core import Quantity, counted, did_you_mean, elementary
+from .budget import check_elements, check_text, size_of
 from .tables import interpolate
 
-MAX_STEPS = 100_000
-MAX_ELEMENTS = 100_000
-MAX_TEXT = 10_000
 MAX_INT = 2**63
 _MAX_DECIMALS = 30
 
@@ -22,86 +20,10 @@ LIST: Final = (list, tuple)
 CONSTANTS: Final = {"pi": math.pi, "e": math.e, "inf": math.inf}
 
 
-class BudgetError(Exception):
-    """An expression costs too much."""
-
-
-class Budget:
-    """What may still be spent, by one evaluation or, as the ``whole``, by several.
-
-    A step is one part of an expression, or ten elements or characters.
-    """
-
-    def __init__(self, steps: int = MAX_STEPS, what: str = "this takes", whole: Budget | None = None) -> None:
-        self._steps = self._left = steps
-        self._what = what
-        self._whole = whole
-
-    @property
-    def is_spent(self) -> bool:
-        """Whether more was requested than was left."""
-        return self._left < 0
-
-    def spend(self, steps: int) -> None:
-        """Deduct some steps, or raise if there are not enough left."""
-        if self._whole is not None:
-            self._whole.spend(steps)
-        self._left -= steps
-        if self._left < 0:
-            raise BudgetError(f"{self._what} more than {self._steps:,} steps")
-
-    def pay(self, value: object) -> None:
-        """Pay for a value that was made, by its length, or raise if it is too long."""
-        if isinstance(value, str):
-            _check_text(len(value))
-            self.spend(len(value) // 10)
-        elif isinstance(value, (list, tuple, dict)):
-            _check_elements(len(value))
-            self.spend(len(value) // 10)
-
-    def weigh(self, value: object) -> None:
-        """Pay for a value that is searched, by its size at all levels, or raise if it is too large."""
-        if isinstance(value, (list, tuple, dict)):
-            self.spend(size_of(value) // 10)
-        else:
-            self.pay(value)
-
-
-def size_of(value: object) -> int:
-    """Count the elements at all levels, shared ones as often as they appear; a text counts by its length."""
-    size = depth = 0
-    level = [value]
-    while level:
-        inner: list[object] = []
-        for item in level:
-            if isinstance(item, str):
-                size += len(item) // 10
-            elif isinstance(item, (list, tuple, dict)):
-                size += len(item)
-                _check_elements(size)
-                inner += item.values() if isinstance(item, dict) else item
-        level = inner
-        depth += 1
-        if depth > MAX_DEPTH and level:
-            raise BudgetError(f"nested deeper than {MAX_DEPTH} levels")
-    _check_elements(size)
-    return size
-
-
-def _check_text(length: int) -> None:
-    if length > MAX_TEXT:
-        raise BudgetError(f"a text of more than {MAX_TEXT:,} characters is too long")
-
-
-def _check_elements(count: int) -> None:
-    if count > MAX_ELEMENTS:
-        raise BudgetError(f"a list of more than {MAX_ELEMENTS:,} elements is too long")
-
-
 def check_result(value: object) -> None:
     """Raise if the value that an expression hands out is too large or has a NaN in it."""
     if isinstance(value, str):
-        _check_text(len(value))
+        check_text(len(value))
     size_of(value)
     stack = [value]
     while stack:
@@ -142,7 +64,7 @@ def text_of(value: object) -> str:
     """Return a value as it appears in a text: `true`, `null`, `3`, `2.5`, `[1, 'a']`."""
     size_of(value)  # which bounds what must be written
     text = value if isinstance(value, str) else _written(value)
-    _check_text(len(text))
+    check_text(len(text))
     return text
 
 
@@ -188,10 +110,10 @@ def _add(left: Any, right: Any) -> Any:
     if isinstance(left, NUMBER) and isinstance(right, NUMBER):
         return _checked(left + right, left, right)
     if isinstance(left, str) and isinstance(right, str):
-        _check_text(len(left) + len(right))
+        check_text(len(left) + len(right))
         return left + right
     if isinstance(left, LIST) and isinstance(right, LIST):
-        _check_elements(len(left) + len(right))
+        check_elements(len(left) + len(right))
         return [*left, *right]
     raise TypeError(f"+ needs two numbers, two texts or two lists, not {kind_of(left)} and {kind_of(right)}")
 
@@ -201,10 +123,10 @@ def _multiply(left: Any, right: Any) -> Any:
         return _checked(left * right, left, right)
     whole, times = (right, left) if isinstance(left, int) else (left, right)
     if isinstance(times, int) and isinstance(whole, str):
-        _check_text(len(whole) * times)
+        check_text(len(whole) * times)
         return whole * times
     if isinstance(times, int) and isinstance(whole, LIST):
-        _check_elements(len(whole) * times)
+        check_elements(len(whole) * times)
         return list(whole) * times
     raise TypeError(
         f"* needs two numbers, or a text or list and a whole number, not {kind_of(left)} and {kind_of(right)}"
@@ -368,7 +290,7 @@ def _range(*values: Any) -> list[int]:
     if len(values) == 3 and values[2] == 0:
         raise ValueError("range needs a step other than 0")
     numbers = range(*values)
-    _check_elements(len(numbers))
+    check_elements(len(numbers))
     return list(numbers)
 
 

@@ -14,10 +14,11 @@ from collections.abc import Iterable
 from typing import Final
 
 from ..core import Quantity
+from .budget import MAX_STEPS
 from .evaluation import evaluate
 from .syntax import ExpressionError, free_names
 from .tables import tables_of
-from .values import CONSTANTS, MAX_INT, MAX_STEPS
+from .values import CONSTANTS, MAX_INT
 
 _SIGNS: Final[dict[type[ast.AST], str]] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%",

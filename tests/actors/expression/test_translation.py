@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from epicycle.actors import EpicycleError
 from epicycle.actors.expression import ExpressionError, Formula, TokenFormula, evaluate, operand
+from epicycle.actors.expression.budget import MAX_TEXT
 from epicycle.actors.expression.translation import UNDECIDED
-from epicycle.actors.expression.values import MAX_TEXT
 
 
 @dataclass(frozen=True)
