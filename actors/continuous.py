@@ -17,7 +17,7 @@ from .core import (
     Wake,
     did_you_mean,
 )
-from .expression import ExpressionError, Formula, FormulaParameter, operand
+from .expression import ExpressionError, Formula, FormulaParameter, check_no_constant, operand
 from .integration import STEPPERS, check_step
 from .trajectory import Trajectory, number_of
 
@@ -120,6 +120,7 @@ class ODE(Actor):
         formulas: list[Mapping[str, Formula]] = [self._rates, self._crossed, *self._reset.values()]
         ports: dict[str, InputPort[Any] | OutputPort[Any]] = {}
         for state in self.initial:
+            check_no_constant("initial", state)
             ports[state] = OutputPort(float, depends_on=("trigger",), doc="a state")
         for crossing in self.crossings:
             if crossing in ports:
@@ -139,6 +140,7 @@ class ODE(Actor):
         for name, formula in self.where.items():
             if name in (*self.initial, *self.crossings, "time", "trigger"):
                 raise ParameterError(f"where: {name!r} is the name of something else; choose another")
+            check_no_constant("where", name)
             known[name] = _replaced(f"where: {name}", formula, known)
         return {name: _replaced(f"{label}: {name}", formula, known) for name, formula in formulas.items()}
 

@@ -2,7 +2,7 @@
 
 from .budget import Budget, BudgetError
 from .evaluation import check_names, evaluate, interpolate, names_in
-from .formula import DOTTED, Formula, FormulaParameter, PortFormula, PortFormulaParameter, as_text
+from .formula import DOTTED, Formula, FormulaParameter, PortFormula, PortFormulaParameter, as_text, check_no_constant
 from .of_token import TokenFormula, TokenFormulaParameter, field_of
 from .syntax import ExpressionError
 from .tokens import operand, value_at
@@ -25,7 +25,7 @@ __all__ = [
     "TokenFormulaParameter",
     "as_text",
     "check_names",
-   
+    "check_no_constant",
     "evaluate",
     "field_of",
     "interpolate",

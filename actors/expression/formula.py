@@ -148,6 +148,14 @@ def _is_condition(node: ast.expr) -> bool:
             return False
 
 
+def check_no_constant(key: str, name: str) -> None:
+    """Refuse the name of a constant for a value of which expressions are; raises ``ParameterError``."""
+    if name in CONSTANTS:
+        raise ParameterError(
+            f"{key}: {name!r} is a constant in expressions; choose another name", (key, name), of_key=True
+        )
+
+
 class PortFormula:
     """A checked expression in which dotted names are tokens: ``references``, in the order of their appearance.
 

@@ -20,7 +20,7 @@ from ..core import (
     did_you_mean,
     to_seconds,
 )
-from ..expression import UNDECIDED, Formula, operand
+from ..expression import UNDECIDED, Formula, check_no_constant, operand
 from ..integration import STEPPERS, check_step
 from ..trajectory import number_of
 from .borders import Borders
@@ -108,6 +108,7 @@ class StateMachine(ModalActor):
                 raise ParameterError(
                     f"variables: {name!r} is a reserved name; choose another", ("variables", name), of_key=True
                 )
+            check_no_constant("variables", name)
             ports[name] = OutputPort(self._type(name), doc="a variable, sent on request")
         named = [
             *(name for formula in read for name in formula.names),

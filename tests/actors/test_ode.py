@@ -216,6 +216,7 @@ def test_a_loop_through_the_states_needs_no_delay() -> None:
     [
         ({"initial": {}}, "it: initial: the mapping is empty; give at least one state"),
         ({"initial": [1]}, "it.initial: [1] is not a mapping of names to number"),
+        ({"initial": {"pi": 1}}, "it: initial: 'pi' is a constant in expressions; choose another name"),
         ({"initial": {"height": "x", "speed": 0}}, "it.initial: height: 'x' is not a number"),
         ({"derivatives": {"height": "speed"}}, "it: derivatives: 'speed' is missing"),
         (
@@ -324,6 +325,7 @@ def test_quantities_are_said_once() -> None:
     ("where", "message"),
     [
         ({"x": "1"}, "where: 'x' is the name of something else; choose another"),
+        ({"inf": "1"}, "where: 'inf' is a constant in expressions; choose another name"),
         (
             {"a": "x + 1", "b": "[a for a in [1]][0] + a"},
             "where: b, with the quantities of 'where' in it: 'a' has another meaning outside of this list; rename it",
