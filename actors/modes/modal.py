@@ -61,7 +61,7 @@ class ModalActor(Actor):
     which the actor is done.  The top of this file defines a reaction.
     """
 
-    copies_share = ("_chart",)
+    copies_share = ("_chart", "_exits")
 
     modes: Any = ()
     initial: Any = None
