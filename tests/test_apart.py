@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from epicycle.actors import EpicycleError
+from epicycle.runner.study.run.processes import Processes
 from epicycle.runner.support import apart
-from epicycle.runner.support.apart import DONE, Apart, Process
+from epicycle.runner.support.apart import DONE, LATE, Apart, Process
 
 
 class Told:
@@ -104,3 +105,25 @@ def test_no_module_of_the_working_directory_is_imported(tmp_path: Path, monkeypa
     it = Apart("it", 30.0, Told, "closed")
     assert it.twice(1) == 2
     it.close()
+
+
+class Maker:
+    """Makes twice a number, once it has slept so long (s)."""
+
+    def __init__(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+    def prepare(self, request: int) -> None:
+        return
+
+    def make(self, request: int) -> int:
+        return 2 * request
+
+
+def test_a_worker_that_does_not_begin_in_time_is_late() -> None:
+    with Processes(Maker, 60.0, patience=3.0) as processes:
+        since = time.monotonic()
+        assert processes.make(4) == (LATE, None)
+        assert time.monotonic() - since < 30.0
+    with Processes(Maker, 0.0, patience=60.0) as processes:
+        assert processes.make(4) == (DONE, 8)

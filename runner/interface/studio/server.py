@@ -39,6 +39,7 @@ from .worker import Message, Worker
 OWN = ("socket", "text", "wiring", "fields", "running", "what_if", "arrange")  # in this order
 LONGEST = 2 * MAX_BYTES + 100_000  # bytes of a message, in which a character may take several
 READING, GRACE = 30.0, 10.0  # s that reading a text may take, and that a run may take beyond its limit
+START = 60.0  # s that a process may take until it listens
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -62,7 +63,7 @@ class Workers:
         self.name = name
         self.patience = patience  # s
         self.stops = stops
-        self.processes = Processes(make)
+        self.processes = Processes(make, patience=START)
         self._turn = asyncio.Lock()
         self._latest: dict[str, Message] = {}
 

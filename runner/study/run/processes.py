@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from ...support.apart import DONE, Outcome, Process, UnwantedError, WorkerError, always
+from ...support.apart import DONE, LATE, Outcome, Process, UnwantedError, WorkerError, always
 
 MAX_STILLBORN = 5  # processes in a row that end before they start work
 
@@ -28,12 +28,13 @@ class Worker(Protocol):
 class Processes:
     """Several processes at once, each of which makes one thing after another.
 
-    In each, ``begin(*arguments)`` makes the worker.
+    In each, ``begin(*arguments)`` makes the worker, in at most ``patience`` seconds.
     """
 
-    def __init__(self, begin: Callable[..., Worker], *arguments: object) -> None:
+    def __init__(self, begin: Callable[..., Worker], *arguments: object, patience: float | None = None) -> None:
         self._begin = begin
         self._arguments = arguments
+        self._patience = patience
         self._guard = threading.Lock()
         self._idle: list[Process] = []
         self._all: set[Process] = set()
@@ -62,7 +63,7 @@ class Processes:
             process = self._taken()
             is_good = False
             try:
-                what, answer = process.begin(is_wanted=is_wanted)
+                what, answer = process.begin(self._patience, is_wanted)
                 for method in ("prepare", "make") if what == DONE else ():
                     what, answer = process.call(method, request, limit=timeout, is_wanted=is_wanted, told=told)
                     if what != DONE:
@@ -70,7 +71,7 @@ class Processes:
                 is_good = what == DONE
             finally:
                 self._give_back(process, is_good)
-            if process.is_ready:
+            if process.is_ready or what == LATE:
                 return what, answer
             code = answer
         raise WorkerError(f"{MAX_STILLBORN} processes in a row ended before they could start (exit code {code})")
