@@ -144,6 +144,24 @@ def test_a_wrong_port_of_an_expression_is_told_with_the_right_ones() -> None:
     assert first.help == ("valid input ports: width, height",)
 
 
+def test_a_port_unlike_all_others_of_an_expression() -> None:
+    with pytest.raises(ModelError) as caught:
+        load(
+            "model: m\n"
+            "actors:\n"
+            "  clock: {type: Clock, period: 1 s}\n"
+            "  two: {type: Expression, expression: 1 + 1}\n"
+            "connections:\n"
+            "  - clock.output -> two.trigger\n"
+        )
+    (only,) = caught.value.problems
+    assert only.message == "two: Expression has no input port 'trigger'"
+    assert only.help == (
+        "valid input ports: none",
+        "its parameters determine further ports; 'epicycle describe Expression' says how",
+    )
+
+
 def test_instances_may_differ_in_their_ports() -> None:
     text = (
         "model: m\n"

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
-from epicycle.actors import declared_parameters, declared_ports, robotics
+from epicycle.actors import declared_parameters, declared_ports, has_own_ports, robotics
 from epicycle.runner.execution.engine import Firing, Simulation, Tracer
 from epicycle.runner.model.build.model import Model
 from epicycle.runner.model.catalogue.types import built_in
@@ -212,7 +212,10 @@ def test_ports_that_there_are_not_and_those_that_are_missing(kind: str) -> None:
     row = ROWS[kind]
     ports = load(text(kind, row.parameters, row.feeds)).graph.actors["it"].inputs
     found = told(problems(kind, row.parameters, {**row.feeds, "zzz": []}))
-    assert found == [(f"it: {kind} has no input port 'zzz'", (f"valid input ports: {', '.join(ports)}",))]
+    helps = [f"valid input ports: {', '.join(ports)}"]
+    if has_own_ports(built_in().actors[kind]):
+        helps.append(f"its parameters determine further ports; 'epicycle describe {kind}' says how")
+    assert found == [(f"it: {kind} has no input port 'zzz'", tuple(helps))]
     if missing := [name for name, port in ports.items() if port.required]:
         assert [message for message, _ in told(problems(kind, row.parameters, {}))] == [
             f"it.{name} is not connected, but {kind} needs it" for name in missing

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
-from epicycle.actors import Actor, FaultError, counted, declared_ports, has_own_ports, paths
+from epicycle.actors import Actor, FaultError, counted, declared_ports, has_own_ports, nearest, paths
 
 from ..graph.model_graph import ModelGraph
 from ..graph.nodes import Edge
@@ -120,6 +120,7 @@ class Member:
     inputs: list[str] = field(default_factory=list)
     outputs: list[str] = field(default_factory=list)
     is_known: bool = True  # whether it has no other ports: an instance that could not be made may have had some
+    is_open: bool = False  # whether its parameters determine further ports
 
     def ports(self, direction: str) -> list[str]:
         return self.inputs if direction == "input" else self.outputs
@@ -129,8 +130,8 @@ def member_of_actors(
     actor_type: type[Actor], paths: list[str], array: bool, count: int | Poison, graph: ModelGraph
 ) -> Member:
     """Actors of one name, some of which perhaps could not be made."""
-    member = Member(actor_type.__name__, paths, array, count)
-    if has_own_ports(actor_type):
+    member = Member(actor_type.__name__, paths, array, count, is_open=has_own_ports(actor_type))
+    if member.is_open:
         actors = [graph.actors[path] for path in paths if path in graph.actors]
         member.inputs = list(dict.fromkeys(name for actor in actors for name in actor.inputs))
         member.outputs = list(dict.fromkeys(name for actor in actors for name in actor.outputs))
@@ -311,6 +312,8 @@ class Wiring:
         else:
             message, near = f"{path}: {member.kind} has no {wanted} port {port!r}", (port, valid)
         hints = [f"valid {wanted} ports: {', '.join(valid) or 'none'}"]
+        if member.is_open and near != NONE and nearest(port, valid) is None:
+            hints.append(f"its parameters determine further ports; 'epicycle describe {member.kind}' says how")
         if self.text is not None and self.text.extends is not None:
             at = self.text.actors[name].type.position  # which may be far from the connection
             hints.append(f"{path} is declared as a {member.kind} at {at}")
