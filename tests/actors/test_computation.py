@@ -144,6 +144,17 @@ def test_a_wrong_port_of_an_expression_is_told_with_the_right_ones() -> None:
     assert first.help == ("valid input ports: width, height",)
 
 
+@pytest.mark.parametrize(("kind", "told"), [("Sum", "Accumulator, AddSubtract"), ("Delay", "Link, TimeDelay")])
+def test_types_are_found_by_what_they_do(kind: str, told: str) -> None:
+    with pytest.raises(ModelError) as caught:
+        load(f"model: m\nactors:\n  one: {{type: {kind}}}\n")
+    assert caught.value.problems[0].help == (
+        "valid types: those that 'epicycle list actors' lists",
+        f"types about '{kind.lower()}': {told}",
+        "for your own types, add '--types FILE.py'; in Python, pass the classes as types=[...]",
+    )
+
+
 def test_a_port_unlike_all_others_of_an_expression() -> None:
     with pytest.raises(ModelError) as caught:
         load(

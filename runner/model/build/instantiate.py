@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
-from epicycle.actors import Actor, FaultError, Parameter, paths
+from epicycle.actors import Actor, FaultError, Parameter, nearest, paths
 
 from ..catalogue.dialect import Dialect
 from ..catalogue.port_types import read_type, token_types
-from ..catalogue.types import Catalogue, CatalogueError
+from ..catalogue.reference import about
+from ..catalogue.types import Catalogue, CatalogueError, built_in
 from ..graph.model_graph import ModelGraph
 from ..graph.nodes import Gap
 from ..language.fields import Computed, sound
@@ -71,7 +72,10 @@ class PartTypes:
         else:
             own = ", ".join(composites[:MAX_SHOWN]) + (", ..." if len(composites) > MAX_SHOWN else "")
             valid = f"{f'{own}, and ' if own else ''}those that 'epicycle list {kind}s' lists"
-        return f"valid types: {valid}", OF_YOUR_OWN
+        is_typo = nearest(asked, [*composites, *types], 0.8) is not None
+        told = [] if is_typo else about(asked, built_in().actors if is_actor else built_in().aspects)[:MAX_SHOWN]
+        hint = (f"types about {asked.lower()!r}: {', '.join(told)}",) if told else ()
+        return f"valid types: {valid}", *hint, OF_YOUR_OWN
 
 
 class Instantiator:

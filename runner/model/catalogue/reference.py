@@ -234,6 +234,15 @@ def first_sentence(doc: str) -> str:
     return re.split(r"(?<=[.!?:]) (?=[A-Z`])", paragraph)[0].rstrip(".:")
 
 
+def about(word: str, types: Mapping[str, type]) -> list[str]:
+    """The types that have a word in their names or in what they do, sorted."""
+    if not (word.isalpha() and 2 < len(word) < 40):
+        return []
+    within = re.compile(rf"\b{word}s?\b", re.IGNORECASE)
+    words = {name: re.sub("([A-Z])", r" \1", name) for name in types}
+    return sorted(name for name in types if within.search(f"{words[name]} {first_sentence(doc_of(types[name]))}"))
+
+
 def _group(cls: type) -> tuple[str, str]:
     """The topic under which a type is listed, and its description; for a package's own types, its name and doc."""
     parts = cls.__module__.split(".")
