@@ -42,11 +42,11 @@ class Agent:
     """What an agent of a model observes and decides, and when.
 
     ``observe``: output ports that send numbers, or arrays of them, of which it sees the last one, or 0 before there is
-    one.  ``act``: input ports that get its decision, each its own number, or all the same of a ``Discrete`` space; an
-    input that takes one connection loses the one that it has.  ``reward``: an output port whose numbers are added up,
-    or several with their weights.  It decides whenever the output port ``when`` has sent, or ``every`` so many seconds
-    (a number, or a text with a unit), or, without both, whenever something it observes has come.  ``actions`` and
-    ``observations`` are spaces of Gymnasium (default: any numbers).
+    one; ``robot[*].charge`` is that of each robot.  ``act``: input ports that get its decision, each its own number, or
+    all the same of a ``Discrete`` space; an input that takes one connection loses the one that it has.  ``reward``: an
+    output port whose numbers are added up, or several with their weights.  It decides whenever the output port ``when``
+    has sent, or ``every`` so many seconds (a number, or a text with a unit), or, without both, whenever something it
+    observes has come.  ``actions`` and ``observations`` are spaces of Gymnasium (default: any numbers).
     """
 
     observe: Iterable[str]
@@ -90,22 +90,23 @@ class _Desk(Actor):
     every = Parameter(float, None, unit="s", above=0, doc="it decides at the start, and again after each such time")
 
     def initialize(self) -> None:
-        self.seen: list[Any] = [None for _ in self.of.observe]
         self.gained = 0.0
         self.asks = False
         self.decision: list[Any] = []
-        self._observed = [self.inputs[f"seen_{place}"] for place, _ in enumerate(self.of.observe)]
+        self._observed = [(name, self.inputs[f"seen_{place}"]) for place, name in enumerate(self.of.observe)]
+        self.seen: list[list[float]] = [[0.0] for _, port in self._observed for _ in range(port.width)]
         self._rewards = [(self.inputs[f"reward_{place}"], each) for place, each in enumerate(self.of.weights.values())]
-        self._asked = [self.inputs["trigger"]] if self.of.when is not None else self._observed
+        self._asked = [self.inputs["trigger"]] if self.of.when is not None else [port for _, port in self._observed]
         self._tick = None if self.every is None else self.wake_in(0.0)
 
     def fire(self) -> None:
         for place, value in enumerate(self.decision):
             self.outputs[f"act_{place}"].send(value)
         self.decision = []
-        for place, port in enumerate(self._observed):
-            if port.present:
-                self.seen[place] = _numbers(port.value, self.of.observe[place])  # type: ignore[index]
+        channels = [(name, tokens) for name, port in self._observed for tokens in port.by_channel()]
+        for place, (name, tokens) in enumerate(channels):
+            if tokens:
+                self.seen[place] = _numbers(tokens[-1], name)
         for (port, weight), name in zip(self._rewards, self.of.weights, strict=True):
             for token in port.tokens:
                 self.gained += weight * _number(token, name)
@@ -137,8 +138,8 @@ class _Policy(_Desk):
             self.decide(_decision(self.path, self.of, type(self).policy(np.array(seen)), str(self.tag)))
 
 
-def _flat(seen: list[Any]) -> list[float]:
-    return [number for each in seen for number in ([0.0] if each is None else each)]
+def _flat(seen: list[list[float]]) -> list[float]:
+    return [number for each in seen for number in each]
 
 
 def _decision(name: str, agent: Agent, action: Any, where: str) -> list[Any]:
@@ -185,7 +186,7 @@ def _seat(model: Model, name: str, agent: Agent, base: type[_Desk] = _Desk, **mo
     sources |= {f"reward_{place}": port for place, port in enumerate(agent.weights)}
     sources |= {} if agent.when is None else {"trigger": agent.when}
     targets = {f"act_{place}": port for place, port in enumerate(agent.act)}
-    ports: dict[str, Any] = {each: InputPort[Any]() for each in sources}
+    ports: dict[str, Any] = {each: InputPort[Any](multi=True) for each in sources}
     ports |= {each: OutputPort[Any](depends_on=()) for each in targets}
     about = {**ports, **more, "of": agent, "__doc__": base.__doc__, "__module__": __name__}
     model.add(type("Agent", (base,), about)(name, every=agent.every))
@@ -233,7 +234,7 @@ class _World:
             self._models.move_to_end(key)
             return self._models[key]
         if not callable(self._source):
-            model = load_model(self._source, **{**self._changes, **options})
+            model = load_model(self._source, partial=True, **{**self._changes, **options})
         elif options or self._changes:
             raise AgentError("a model that a function makes takes no options: let the function have them")
         else:

@@ -16,6 +16,7 @@ from ..model.build.model import Model
 from ..model.catalogue.types import types_of_file
 from ..model.language.settings import Setting
 from ..model.text.document import plain
+from ..model.text.limits import NORMAL
 from ..model.text.program import call_site, node_of
 from ..support.shapes import fits
 
@@ -91,7 +92,7 @@ class RunSpec:
             aspects=self.aspects,
             without_aspects=self.without_aspects,
             types=[each for file in self.types for each in types_of_file(Path(file))],
-            **({} if self.max_actors is None else {"max_actors": self.max_actors}),
+            max_actors=NORMAL.actors if self.max_actors is None else self.max_actors,
         )
 
     def command(self) -> list[str]:

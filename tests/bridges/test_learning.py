@@ -275,3 +275,27 @@ def test_resets_are_fast() -> None:
     for seed in range(2000):
         env.reset(seed=seed)
     assert 2000 / (time.process_time() - begin) > 300  # 1,000 and more on an idle machine
+
+
+def test_all_instances_are_observed_and_rewarded_by_one_name(tmp_path: Path) -> None:
+    path = tmp_path / "three.yaml"
+    path.write_text(
+        "model: three\n"
+        "actors:\n"
+        "  one: {type: Ramp, count: 3, init: '${10 * index}'}\n"
+        "  clock: {type: Clock, period: 1 s}\n"
+        "  goes: {type: Recorder}\n"
+        "connections:\n"
+        "  - clock.output -> one[*].trigger\n",
+        encoding="utf-8",
+    )
+    act = {"act": "goes.input", "every": "2 s", "until": 10.0}
+    env = epicycle.gym(path, observe="one[*].output", reward={"one[*].output": 1.0}, **act)
+    assert env.observation_space.shape == (3,)
+    seen, _ = env.reset(seed=1)
+    assert seen.tolist() == [0.0, 10.0, 20.0]
+    seen, reward, *_ = env.step(np.zeros(1))
+    assert seen.tolist() == [2.0, 12.0, 22.0]
+    assert reward == 1.0 + 11.0 + 21.0 + 2.0 + 12.0 + 22.0
+    env = epicycle.gym(path, observe=["one[2].output", "one[0..1].output"], reward="one[0].output", **act)
+    assert env.reset(seed=1)[0].tolist() == [20.0, 0.0, 10.0]

@@ -36,12 +36,15 @@ def factor(text: str) -> float:
 
 def load(
     model: Annotated[str | Path, argument("a path to a YAML file, or the name of a packaged model", "MODEL")],
+    *,
+    partial: bool = False,
     **changes: Unpack[Changes],
 ) -> Model:
     """Load a packaged model or a file, with changes.
 
     ``set`` gives parameters their values, ``overrides`` files with such values, ``disturb`` disturbances, ``aspects``
-    further aspects, ``without_aspects`` those that go; ``types`` are classes of your own, or files with them.  Raises
+    further aspects, ``without_aspects`` those that go; ``types`` are classes of your own, or files with them.  Of a
+    ``partial`` model, inputs may be unconnected, to which the program will connect something before it runs.  Raises
     ``ModelError`` with everything that is wrong.
 
     >>> epicycle.load("mm1", set={"load": 0.9}).parameters["load"]
@@ -50,7 +53,7 @@ def load(
     from ...study.run_spec import RunSpec, named
 
     given = list(changes.get("types", ()))
-    more: Any = {**changes, "types": classes(given)}
+    more: Any = {**changes, "types": classes(given), "partial": partial}
     made = load_model(model, **more)
     if any(isinstance(each, type) for each in given):  # which nothing but this program knows
         return made

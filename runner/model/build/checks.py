@@ -22,18 +22,20 @@ MAX_PASSAGE = 200  # composite ports in a row
 MAX_SHOWN = 10  # names in one message
 
 
-def check(graph: ModelGraph, problems: Problems, *, whole: bool = True) -> None:
+def check(graph: ModelGraph, problems: Problems, *, whole: bool = True, partial: bool = False) -> None:
     """Report every wiring problem: types, missing connections, two writers, loops without delay.
 
-    If it is the ``whole`` model and nothing is wrong, warn of actors that can never fire.
+    If it is the ``whole`` model and nothing is wrong, warn of actors that can never fire.  A ``partial`` model is one
+    to which a program will add: no connection is missing yet.
     """
     if not check_passages(graph, problems):
         return
     check_dialects(graph, problems)
     check_types(graph, problems)
-    check_connections(graph, problems)
+    if not partial:
+        check_connections(graph, problems)
     check_loops(graph, problems)
-    if whole and not len(problems):
+    if whole and not partial and not len(problems):
         check_reach(graph, problems)
 
 

@@ -55,6 +55,7 @@ class ModelChanges(TypedDict, total=False):
     disturb: str | Path | Iterable[str | Path]
     types: Iterable[type]
     max_actors: int
+    partial: bool
 
 
 def load_model(name: str | Path, **changes: Unpack[ModelChanges]) -> Model:
@@ -67,7 +68,8 @@ def load_model(name: str | Path, **changes: Unpack[ModelChanges]) -> Model:
     apply after that, and all settings win over what a disturbance sets.  A setting, too, is the list of the only acts
     of aspects that happen, ``exactly=[{aspect: ..., at: ..., token: ...}]``.  ``types`` are your own actor and aspect
     classes, which the model may name besides the installed ones. ``max_actors`` is the limit for actors and composites,
-    and a fifth of the limit for connections.  ``Model.warnings`` holds what is odd but not wrong.
+    and a fifth of the limit for connections.  Of a ``partial`` model, inputs may be unconnected, to which a program
+    will connect something; it is checked again before it runs.  ``Model.warnings`` holds what is odd but not wrong.
     """
     if unknown := changes.keys() - ModelChanges.__annotations__.keys():
         raise TypeError(f"load_model() got an unexpected keyword argument {min(unknown)!r}")
@@ -94,6 +96,7 @@ class Loading:
         """Read, change and check a model."""
         problems, types = self.problems, list(changes.get("types", ()))
         limits = Limits(changes.get("max_actors", NORMAL.actors))
+        partial = changes.get("partial", False)
         aspects, without_aspects = list(changes.get("aspects", ())), list(changes.get("without_aspects", ()))
         with problems.looking_for(OUTSIDE):
             files = _several(changes.get("overrides", ()))
@@ -129,17 +132,25 @@ class Loading:
             resolver = ParameterResolver(problems, Settings(settings, limits))
             self.model = Model(text.root.name, doc=text.root.doc)
             with problems.looking_for(VALUE):
-                build(text, self.known, resolver, limits, self.model)
+                build(text, self.known, resolver, limits, self.model, partial=partial)
             if self.model.figures:
                 with problems.looking_for(FIGURE):
                     figures_of(self.model, problems)
             self.model.warnings = problems.warnings
-            self.model.is_checked = not problems.found
+            self.model.is_checked = not (problems.found or partial)
             said = [*map("without {}".format, without_aspects), *aspects]
             self.model.origin = Origin(noted, given, said, types)
 
 
-def build(text: ModelText, known: PartTypes, resolver: ParameterResolver, limits: Limits, model: Model) -> None:
+def build(
+    text: ModelText,
+    known: PartTypes,
+    resolver: ParameterResolver,
+    limits: Limits,
+    model: Model,
+    *,
+    partial: bool = False,
+) -> None:
     """Make the model that declarations describe, in passes; it is valid only if there are no problems afterwards."""
     problems, root = resolver.problems, text.root
     # Without a composite, nothing needs the types of all packages.
@@ -160,7 +171,7 @@ def build(text: ModelText, known: PartTypes, resolver: ParameterResolver, limits
     else:
         woven = weave_all(made)
         resolver.check_unused(made.graph)
-        check(made.graph, problems)
+        check(made.graph, problems, partial=partial)
         with problems.looking_for(ASPECT):
             check_processors(woven, problems)
             acts = None if text.exactly is None else acts_of(text.exactly, woven, problems)
