@@ -288,8 +288,9 @@ class Pointcuts(View):
     def _units_of(self, pointcut: PointcutText, index: PathIndex) -> list[str] | Poison:
         """The actors and composites that one pointcut selects."""
         name, text = self.kind, pointcut.text
-        if pointcut.port is not None:
-            self.tell(f"{name} attaches to actors, not to their ports", pointcut.port, "leave 'port' out")
+        for key, said in (("port", pointcut.port), ("parameter", pointcut.parameter)):
+            if said is not None:
+                self.tell(f"{name} attaches to actors, not to their {key}s", said, f"leave {key!r} out")
         if not text:
             owners = self._chosen_owners(pointcut)
             return POISON if owners is POISON else sorted(owners)

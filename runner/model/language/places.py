@@ -288,9 +288,13 @@ def pointcuts(reader: NodeReader, node: Node, what: str) -> tuple[PointcutText |
 def _pointcut(reader: NodeReader, item: Mapping) -> PointcutText | Poison:
     entries = POINTCUT.entries(reader, item, "a pointcut") or {}
     said = POINTCUT.values(reader, entries, "a pointcut", item.position)
-    if sum(key in entries for key in ("at", "type", "tag")) != 1 or ("at" in entries and "port" in said):
+    places = [key for key in ("port", "parameter") if key in said]
+    if sum(key in entries for key in ("at", "type", "tag")) != 1 or ("at" in entries and places):
         hint = "write {at: ...}, {type: ..., port: ...} or {tag: ...}"
         return reader.problems.add("a pointcut selects by pattern, type or tag", item.position, hint)
+    if len(places) > 1:
+        message = "a pointcut selects ports or a parameter, not both"
+        return reader.problems.add(message, entries["parameter"].key.position, "leave out 'port' or 'parameter'")
     if POISON in said.values():
         return POISON
     at = said.pop("at", None)
