@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import math
 import re
+import sys
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection
 from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass, field
 from decimal import Decimal
+from fractions import Fraction
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -23,6 +26,7 @@ from .sampling import (
     HYPERCUBE,
     LATIN,
     MAX_SAMPLES,
+    MAX_VALUES,
     MORRIS,
     MORRIS_INDICES,
     SAMPLINGS,
@@ -38,6 +42,8 @@ from .settings import Setting, is_pattern, settings_in
 
 Factor: TypeAlias = bool | int | float | str | None
 Bounds: TypeAlias = tuple[float, float, str, Position]  # low, high, their unit, and where they are given
+_MAX_WHOLE = 2**63  # of a column of whole numbers
+_LARGEST = sys.float_info.max
 KINDS: dict[str, type] = {"bool": bool, "int": int, "float": float, "text": str}
 
 _NUMBER = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?)\s*(.*?)\s*")
@@ -112,7 +118,8 @@ class Ranged(Dimension):
     def __init__(
         self, path: str, position: Position, start: Decimal, step: Decimal, size: int, unit: str, at: Position
     ) -> None:
-        is_whole = not unit and start == start.to_integral_value() and step == step.to_integral_value()
+        is_whole = not unit and all(each == each.to_integral_value() for each in (start, step))
+        is_whole = is_whole and max(abs(start), abs(start + (size - 1) * step)) < _MAX_WHOLE
         super().__init__(path, position, {path: "int" if is_whole else "float"})
         self._start, self._step, self._size, self._unit, self._at = start, step, size, unit, at
 
@@ -121,23 +128,30 @@ class Ranged(Dimension):
         return self._size
 
     def level(self, index: int) -> Level:
+        value = self._number(index)
+        setting = Setting(self.name, number_node(value, self._unit, self._at), self.position)
+        return Level((setting,), {self.name: in_si(value, self._unit)})
+
+    def _number(self, index: int) -> int | float:
+        """The number of a level, in the unit of the range."""
         number = self._start + index * self._step
-        value: int | float = int(number) if self.columns[self.name] == "int" else float(number)
-        node = number_node(value, self._unit, self._at)
-        return Level((Setting(self.name, node, self.position),), {self.name: in_si(value, self._unit)})
+        return int(number) if self.columns[self.name] == "int" else float(number)
+
+    def _held(self, index: int) -> int | float:
+        """The number of a level, as the table holds it."""
+        return in_si(self._number(index), self._unit)
 
     def is_distinct(self) -> bool:
         """Whether no two levels are equal as floats: the ends, far from zero, are the likeliest to be."""
-        ends = {0, max(0, self._size - 2)} if self._size > 1 else set()
-        return all(self.level(at).values != self.level(at + 1).values for at in ends)
+        return all(self._held(at) != self._held(at + 1) for at in {0, self._size - 2} if 0 <= at < self._size - 1)
 
     def find(self, values: AnyMapping[str, Factor]) -> int | None:
-        first, second, wanted = (
-            float(each or 0) for each in (*(self.level(at).values[self.name] for at in (0, 1)), values[self.name])
-        )
-        index = round((wanted - first) / (second - first))
-        is_there = 0 <= index < self._size and self.level(index).values[self.name] == values[self.name]
-        return index if is_there else None
+        wanted = values[self.name]
+        if not isinstance(wanted, (int, float)) or (isinstance(wanted, float) and not math.isfinite(wanted)):
+            return None
+        first, last = (Fraction(self._held(at)) for at in (0, self._size - 1))
+        index = round((Fraction(wanted) - first) * (self._size - 1) / (last - first)) if self._size > 1 else 0
+        return index if 0 <= index < self._size and self._held(index) == wanted else None
 
 
 def number_node(value: float, unit: str, position: Position) -> Scalar:
@@ -160,16 +174,14 @@ def split_number(node: Node) -> tuple[Decimal, str] | None:
     return None if found is None else (Decimal(found[1]), found[2])
 
 
-def kind_of(nodes: Iterable[Node]) -> str:
+def kind_of(nodes: Collection[Node]) -> str:
     """What a column filled with these values holds."""
-    nodes = list(nodes)
     values = [node.value if isinstance(node, Scalar) else node for node in nodes]
     if all(isinstance(value, bool) for value in values):
         return "bool"
-    if all(isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63 for value in values):
-        return "int"
-    if all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values):
-        return "float"
+    numbers = [value for value in values if isinstance(value, (int, float)) and not isinstance(value, bool)]
+    if len(numbers) == len(values) and all(isinstance(each, float) or abs(each) <= _LARGEST for each in numbers):
+        return "int" if all(isinstance(each, int) and abs(each) < _MAX_WHOLE for each in numbers) else "float"
     if all(isinstance(value, str) and _quantity(node) is not None for value, node in zip(values, nodes, strict=True)):
         return "float"
     return "text"
@@ -322,6 +334,8 @@ class DimensionReader(NodeReader):
         found = split_number(node)
         if found is None:
             return self.problems.add(f"{what} is not a number", node.position, "write 5, 0.1 or '5 m'")
+        if abs(found[0]) > _LARGEST:
+            return self.problems.add(f"{what} is too large for a float", node.position)
         try:
             if found[1]:
                 parse_unit(found[1])
@@ -350,10 +364,12 @@ class DimensionReader(NodeReader):
             return self.problems.add(
                 f"the levels {steps} of {name!r} are not even", entries["levels"].value.position, hint
             )
-        most = MAX_SAMPLES // {SOBOL: len(box) + 2, MORRIS: len(box) + 1}.get(form, 1)
-        if size > most:
-            told, hint = f"{form} of {name!r} has more than {MAX_SAMPLES:,} points", f"with {len(box)} parameters, take"
-            return self.problems.add(told, at, f"{hint} at most {most:,}")
+        points = {SOBOL: len(box) + 2, MORRIS: len(box) + 1}.get(form, 1)  # of a block
+        for limit, each, what in ((MAX_SAMPLES, points, "points"), (MAX_VALUES, points * len(box), "values")):
+            if size > (most := limit // each):
+                told = f"{form} of {name!r} has more than {limit:,} {what}"
+                hint = f"with {len(box)} parameters, take at most {most:,}" if most > 1 else "take fewer parameters"
+                return self.problems.add(told, at, hint)
         taken: tuple[tuple[tuple[int, float], ...], ...] = ()
         if form == SOBOL:
             blocks = sobol_blocks(size, seed, list(box))

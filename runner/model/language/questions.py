@@ -179,16 +179,16 @@ class QuestionReader(NodeReader):
             if not self.is_factor(factor, entry.key.position, what):
                 found[factor] = [POISON]
             elif items:
-                found[factor] = [self.level(factor, item, what) for item in items]
+                known = levels_of(self.dimensions, factor)
+                found[factor] = [self.level(factor, known, item, what) for item in items]
             else:
                 found[factor] = [self.problems.add(f"{what}: {key!r} lists no level of {factor}", entry.value.position)]
         if any(POISON in levels for levels in found.values()):
             return POISON
         return {factor: tuple(dict.fromkeys(level[0] for level in levels if level)) for factor, levels in found.items()}
 
-    def level(self, factor: str, node: Node, what: str) -> tuple[Factor] | Poison:
-        """The level that a node names, as the table holds it."""
-        known = levels_of(self.dimensions, factor)
+    def level(self, factor: str, known: list[Factor], node: Node, what: str) -> tuple[Factor] | Poison:
+        """The level that a node names, of those that a factor takes, as the table holds it."""
         value = as_factor(node, self.kinds[factor]) if isinstance(node, (Scalar, Sequence)) else ""
         is_number = self.kinds[factor] == "float" and isinstance(value, (int, float)) and not isinstance(value, bool)
         for each in known:

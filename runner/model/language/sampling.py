@@ -19,6 +19,7 @@ Point: TypeAlias = tuple[float, ...]
 
 LATIN, SOBOL, MORRIS = "latin_hypercube", "sobol", "morris"  # forms
 MAX_SAMPLES = 100_000  # points of a box, which are made together
+MAX_VALUES = 2_000_000  # of all parameters at these points
 _BITS = 30  # of a coordinate in a Sobol sequence
 
 

@@ -290,8 +290,13 @@ class _StudyReader(NodeReader):
         if isinstance(node, Mapping):
             variants = {name: self.texts(each.value, "a disturbance") or () for name, each in node.entries.items()}
         else:
-            texts = self.texts(node, what) or ()
-            variants = {Path(text.text).stem: (text,) for text in texts}
+            variants = {}
+            for text in self.texts(node, what) or ():
+                name = Path(text.text).stem
+                if name in variants:
+                    hint = f"give each a name of its own: '{what}: {{first: FILE, second: FILE}}'"
+                    self.problems.add(f"{what} lists {name!r} twice", text.position, hint)
+                variants.setdefault(name, (text,))
         levels = []
         for variant, texts in variants.items():
             if self.asks_for_files:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from epicycle.runner.model.language.dimensions import Ranged
 from tests.study.study_parts import plan_of, write
 
 HEAD = "study: s\nmodel: ./walk.yaml\n"
@@ -30,6 +31,8 @@ def values(tmp_path: Path, text: str) -> list[dict[str, Any]]:
         ("fails: [[], [1, 2]]", [{"fails": "[]"}, {"fails": "[1, 2]"}]),
         ("drift: {from: 0, to: 0.3, step: 0.1}", [{"drift": each} for each in (0.0, 0.1, 0.2, 0.3)]),
         ("drift: {from: 3, to: 0, step: -2}", [{"drift": 3}, {"drift": 1}]),
+        ("drift: {from: 1, to: 1, step: 1e-30}", [{"drift": 1.0}]),
+        (f"drift: {{from: {10**17}, to: {10**17 + 2}, step: 1}}", [{"drift": 10**17 + each} for each in range(3)]),
         ("drift: {from: 10 cm/s, to: 30 cm/s, step: 10 cm/s}", [{"drift": each} for each in (0.1, 0.2, 0.3)]),
         (
             "both: {zip: {drift: [1, 2], pause: [0.1, 0.2]}}",
@@ -44,6 +47,16 @@ def test_levels_are_what_the_form_says(vary: str, expected: list[dict[str, Any]]
     assert [[type(value) for value in each.values()] for each in found] == [
         [type(value) for value in each.values()] for each in expected
     ]
+
+
+def test_the_levels_of_a_claim_are_looked_up_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not anew for each level that the claim names, of which there may be thousands."""
+    made: list[int] = []
+    monkeypatch.setattr(Ranged, "level", lambda self, at, level=Ranged.level: made.append(at) or level(self, at))
+    few = ", ".join(map(str, range(100)))
+    claims = f"claims: {{c: {{less: place, at: {{drift: [{few}]}}}}}}\n"
+    plan_of(write(tmp_path, f"{HEAD}metrics: [place]\nvary: {{drift: {{from: 0, to: 199, step: 1}}}}\n{claims}"))
+    assert len(made) < 2000
 
 
 def test_settings_reach_the_model(tmp_path: Path) -> None:
