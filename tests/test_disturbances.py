@@ -316,6 +316,17 @@ def test_a_disturbance_in_python_is_the_one_of_the_command_line(tmp_path: Path) 
     assert [repr(aspect) for aspect in swept] == ["PacketLoss(probability=0.1)", "PacketLoss(probability=0.2)"]
 
 
+@pytest.mark.parametrize("gap", ["{value: 100, unit: ms}", "{value: 0.1, unit: s}", "{value: , unit: ms}"])
+def test_parameters_of_a_model_keep_their_units_in_a_later_disturbance(gap: str, tmp_path: Path) -> None:
+    actors = "actors: {clock: {type: Clock, period: '${gap}'}, seen: {type: Recorder}}\n"
+    model, file = tmp_path / "m.yaml", tmp_path / "late.yaml"
+    model.write_text(f"model: m\nparameters: {{gap: {gap}}}\n{actors}connections: [clock.output -> seen.input]\n")
+    file.write_text("disturbance: late\naspects: {late: {type: Latency, delay: '${gap}', at: seen.input}}\n")
+    at_once, later = load_model(model, disturb=file, set={"gap": "0.1 s"}), load_model(model, set={"gap": "0.1 s"})
+    (woven,) = later.disturb(file)
+    assert repr(woven.aspect) == repr(at_once.aspects[0].aspect) == "Latency(delay=0.1)"
+
+
 def test_what_is_wrong_with_a_disturbance_of_a_model_that_is_made(tmp_path: Path) -> None:
     file = tmp_path / "leaky.yaml"
     file.write_text(DISTURBANCE)

@@ -17,6 +17,7 @@ from ..graph.model_graph import ModelGraph
 from ..graph.outputs import OutputSpec
 from ..graph.ranks import firing_order
 from ..graph.woven import WovenAspect, check_processors
+from ..language.ports import ParameterText
 from ..language.settings import Setting
 from ..text.document import plain
 from ..text.files import Noted
@@ -67,6 +68,7 @@ class Building:
         self.name = name
         self.graph = ModelGraph()  # all actors, composites, ports and connections
         self.parameters: dict[str, object] = {}
+        self.declared: dict[str, ParameterText] = {}  # what its file declares of the parameters
         self.aspects: list[WovenAspect] = []
         self.exactly: frozenset[ActName] | None = None  # the only acts of aspects that happen
         self.output = OutputSpec()

@@ -44,7 +44,10 @@ def disturb(
     direction, in place of those that the disturbances name.  Of aspects with the same name, the last one counts.
     """
     problems, position, catalogue = Problems(), call_site(), installed().with_types(types)
-    own = {key: ParameterText(key, position, node_of(value, position)) for key, value in model.parameters.items()}
+    own = {
+        key: replace(model.declared.get(key) or ParameterText(key, position), value=node_of(value, position))
+        for key, value in model.parameters.items()
+    }
     root, composites = CompositeText(model.name, position, parameters=own), dict[str, CompositeText]()
     exactly: tuple[ActText, ...] | None = None
     left_out: list[str] = []

@@ -18,7 +18,6 @@ from ..catalogue.metrics import MetricOptions, MetricSpec, TakeName, take_fault
 from ..graph.woven import WovenAspect
 from ..language.fields import nanoseconds
 from ..language.metrics import WatchText
-from ..language.ports import ParameterText
 from ..language.values import Locals
 from ..temporal import Requirement, RequirementOptions
 from ..text.document import Mapping as MappingNode
@@ -74,7 +73,6 @@ class Model(Building, Scope, Tabled):
             found = director_of(name, {"like": like}, call_site(), problems)
         self.graph.domains[""].dialect = found.get("like", Dialect)
         self.parameters |= parameters or {}
-        self.declared: dict[str, ParameterText] = {}  # what its file declares of the parameters
         self.figures: dict[str, DeclaredFigure] = {}
         self.output.seed = checked_seed(seed)
         self.stop = stop
