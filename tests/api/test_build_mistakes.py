@@ -162,6 +162,18 @@ error: late.output is an output of Noisy, so nothing can go to it
 error: x: director.drift: 0 is out of bounds, expected a number from 1e-06 to 1000000
 2 errors""",
     ),
+    "clock of a director that is not there": (
+        lambda m: m.composite("x", start="2 s", drift=2, like="ptolemy"),
+        """error: x: 'start' belongs to a director, and x has none of its own
+   help: write director=True
+
+error: x: 'drift' belongs to a director, and x has none of its own
+   help: write director=True
+
+error: x: 'like' belongs to a director, and x has none of its own
+   help: write director=True, or set it for the model
+3 errors""",
+    ),
     "own port": (
         lambda m: m["robot[0]"].connect("positon -> inner.trigger"),
         """error: robot[0] has no input port 'positon' of its own
@@ -206,6 +218,29 @@ error: x: director.drift: 0 is out of bounds, expected a number from 1e-06 to 10
     "record an input": (
         lambda m: m.record(m["sum"].input),
         "error: record: sum.input is an input port, but an output port is needed, did you mean 'sum.output'?",
+    ),
+    "record what is no port": (
+        lambda m: m.record(5, Clock("clock", period=1).output),
+        """error: 5 is not a port
+   help: give a port such as clock.output, or its path as text
+
+error: the actor of clock.output is not part of this model
+   help: add it to the model first
+2 errors""",
+    ),
+    "stop when there is no port": (
+        lambda m: m.stop_when(m["sum"]),
+        """error: sum is an actor, not a port
+   help: name one of its ports: sum.input, sum.output, sum.enough""",
+    ),
+    "metric of what is no port": (
+        lambda m: m.metric("other", of=[5, "sum.output"]),
+        """error: 5 is not a port
+   help: give a port such as clock.output, or its path as text""",
+    ),
+    "disturb what is no port": (
+        lambda m: m.disturb("wifi_burst", at=["sum.inptu"]),
+        "error: there is no port 'sum.inptu', did you mean 'sum.input'?",
     ),
     "metric": (
         lambda m: m.metric("total", of="sum.output", take="men"),

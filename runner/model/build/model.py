@@ -26,7 +26,7 @@ from ..text.problems import Position, Problems
 from ..text.program import call_site
 from ..text.reading import NAME, NAMES_HAVE, Text, within
 from .building import Building
-from .named import Port, director_of, raising
+from .named import Named, Port, director_of, raising
 from .outputs import OutputReader, checked_seed
 from .resolve import ParameterResolver
 from .scope import Scope
@@ -120,8 +120,13 @@ class Model(Building, Scope, Tabled):
         from .disturbance import disturb
 
         places: dict[str, list[str]] = {"input": [], "output": []}
-        for path in at or ():
-            places[self.graph.ports[path].direction].append(path)
+        ports, position = self.graph.ports, call_site()
+        with raising() as problems:
+            for path in at or ():
+                if path in ports:
+                    places[ports[path].direction].append(path)
+                else:
+                    problems.add(f"there is no port {path!r}", position, near=(path, ports))
         woven, _ = disturb(self, [str(disturbance)], set or {}, types, only_ports=at is not None, at=places)
         return woven
 
@@ -171,8 +176,8 @@ class Model(Building, Scope, Tabled):
         problems.raise_if_any()
         with raising() as problems:
             reader = OutputReader(self.graph, ParameterResolver(problems), self.output)
-            texts = (each if isinstance(each, str) else each.path for each in ports)
-            of_ports = tuple(Text(each, within(position, each)) for each in texts)
+            named = Named(self.graph, self.path, position, problems)
+            of_ports = tuple(text for each in ports if (text := named.watched(each)) is not None)
             source = Scalar(formula, formula, False, within(position, formula)) if formula else None
             given: dict[str, object] = {"take": take, **options}
             entries = reader.options(MetricSpec, f"metric {name}", given, position)
@@ -208,9 +213,10 @@ class Model(Building, Scope, Tabled):
         position = call_site()
         with raising() as problems:
             reader = OutputReader(self.graph, ParameterResolver(problems), self.output)
+            named = Named(self.graph, self.path, position, problems)
             for port in ports:
-                path = port if isinstance(port, str) else port.path
-                ask(reader, Text(path, within(position, path)))
+                if (text := named.watched(port)) is not None:
+                    ask(reader, text)
         self.output = reader.found
 
     # -- for people -----------------------------------------------------------------------------------------------

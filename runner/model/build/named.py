@@ -131,6 +131,11 @@ class Named:
                     found.append(PointcutText(here, within(self._position, here), request=asked))
         return found
 
+    def watched(self, port: object) -> Text | None:
+        """A port, or a pattern of ports, as a model file would name what is watched."""
+        path = port if isinstance(port, str) else self._port(port)
+        return None if path is None else self._text(path)
+
     def _text(self, name: str) -> Text:
         return Text(name, within(self._position, name))
 

@@ -149,9 +149,11 @@ class Scope(Holder):
         with raising() as problems:
             full = self._free(name, position, problems)
             given = director_of(full, {"start": start, "drift": drift, "like": like}, position, problems)
-            if not director and like:
-                message = f"{full}: 'like' belongs to a director, and {full} has none of its own"
-                problems.add(message, position, "write director=True, or set it for the model")
+            for key, is_given in (("start", start is not None), ("drift", drift != 1.0), ("like", like is not None)):
+                if is_given and not director:
+                    message = f"{full}: {key!r} belongs to a director, and {full} has none of its own"
+                    elsewhere = ", or set it for the model" if key == "like" else ""
+                    problems.add(message, position, f"write director=True{elsewhere}")
         for number, (_, port) in enumerate(ports):
             made.check_port(port, [each for _, each in ports[:number]], position)
         graph = self._model.edit()
@@ -174,6 +176,8 @@ class Scope(Holder):
                 problems.add(f"{self._name} has no actor {name!r}{did_you_mean(name, known)}", position, hint)
             elif full != instances[-1]:
                 problems.add(f"{full} is not the last of its array", position, f"only {instances[-1]} can be removed")
+            elif full in ((around := self._model.graph.domain_of(full)).machine, *around.refinements.values()):
+                problems.add(f"{full} belongs to the modes of {self.path}", position, f"remove {self.path} as a whole")
         self._model.forget(full)
 
     def _composite(self, full: str) -> Composite:
