@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from epicycle.actors import Actor, Clock, EpicycleError, InputPort, Merge, Recorder, Scale, Server
-from epicycle.aspects import CommunicationAspect, JoinPoint, PacketLoss
+from epicycle.aspects import CommunicationAspect, JoinPoint, PacketLoss, Processor
 from epicycle.runner import Model, ModelError, Simulation, load_composite, load_model
 
 LIBRARY = """
@@ -43,6 +43,13 @@ aspects:
   loss: {type: PacketLoss, probability: 0.3, at: shop.input}
 run: {stop: 20, record: [line.response], stop_when: clock.output}
 metrics: {ticks: {of: clock.output, take: count}}
+"""
+MODES = """
+model: m
+composites:
+  Lit: {actors: {clock: {type: Clock, period: 1}}}
+  Lamp: {modes: {off: , on: {refinement: Lit}}, transitions: [off -> on after 1 s]}
+actors: {lamp: {type: Lamp}}
 """
 DISTURBANCE = """
 disturbance: d
@@ -275,6 +282,48 @@ def test_a_graph_that_is_run_is_frozen() -> None:
     assert list(graph.actors) == ["clock", "scale"]
     assert simulation.run().digest == Simulation(_same(Scale("scale"))).run().digest
     assert Simulation(model).run().digest != simulation.log.digest
+
+
+def test_an_actor_of_a_frozen_graph_stays_where_it_is() -> None:
+    model = Model("m", stop=3)
+    clock, scale = model.add(Clock("clock", period=1)), model.add(Scale("scale"))
+    model.connect(clock.output, scale.input)
+    simulation = Simulation(model)
+    model.remove("scale")
+    with pytest.raises(ModelError) as caught:
+        model.composite("inner").add(scale)
+    (problem,) = caught.value.problems
+    assert problem.message == "scale is already part of a model, and an actor belongs to only one"
+    assert scale.path == "scale"
+    assert simulation.run().digest == Simulation(_same(Scale("scale"))).run().digest
+    model.add(Scale("scale"))
+    model.remove("scale")
+    model.add(Recorder("scale"))
+
+
+def test_what_is_woven_around_a_checked_model_is_checked() -> None:
+    model = _same(Scale("scale"))
+    model.weave("one", Processor(time=0.1), at="scale")
+    Simulation(model)
+    model.weave("other", Processor(time=0.1), at="scale")
+    with pytest.raises(ModelError) as caught:
+        Simulation(model)
+    (problem,) = caught.value.problems
+    assert problem.message == "aspect other: scale already runs on the processor 'one'"
+
+
+def test_a_composite_with_modes_loses_none_of_its_parts(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(MODES, encoding="utf-8")
+    model = load_model(tmp_path / "m.yaml")
+    for name in ("machine", "on"):
+        with pytest.raises(ModelError) as caught:
+            model["lamp"].remove(name)
+        (problem,) = caught.value.problems
+        assert (problem.message, problem.help) == (
+            f"lamp.{name} belongs to the modes of lamp",
+            ("remove lamp as a whole",),
+        )
+    model.remove("lamp")
 
 
 def _same(receiver: Scale) -> Model:

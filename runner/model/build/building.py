@@ -132,7 +132,8 @@ class Building:
             self.exactly = (self.exactly or frozenset()) | exactly
 
     def enlist(self, aspects: Iterable[WovenAspect]) -> None:
-        """Add these aspects to the model."""
+        """Add these aspects to the model, with which it is to be checked again."""
+        self.is_checked = False
         self.origin = None
         self.aspects = arranged([*self.aspects, *aspects], self.graph)
 

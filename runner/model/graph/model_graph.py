@@ -47,6 +47,7 @@ class ModelGraph:
         self.is_wired = True  # whether every connection has been made
         self.limits: Limits = limits if inside is None else inside.limits
         self.is_frozen = False
+        self._shared: Collection[str] = ()  # actors that a frozen graph has, too
         self._channels: Channels | None = None  # worked out since then
         self._hops: dict[int, Edge] = {}  # in their order
         self._order: int = 0 if inside is None else inside._order
@@ -69,6 +70,7 @@ class ModelGraph:
         made.domains = {path: replace(each, members=[*each.members]) for path, each in self.domains.items()}
         made._hops, made._order = dict(self._hops), self._order
         made.gaps, made.fed, made.is_wired = dict(self.gaps), {*self.fed}, self.is_wired
+        made._shared = {*self.actors} if self.is_frozen else self._shared
         return made
 
     def part(self, director: str) -> ModelGraph:
@@ -222,7 +224,7 @@ class ModelGraph:
             del self.components[gone]
             self.domains.pop(gone, None)
             if (actor := self.actors.pop(gone, None)) is not None:
-                actor.is_part = False
+                actor.is_part = gone in self._shared
         for domain in self.domains.values():
             domain.members[:] = [each for each in domain.members if not paths.is_within(each, path)]
 
