@@ -24,7 +24,6 @@ from ..model.language.dimensions import (
     DimensionReader,
     Factor,
     Level,
-    Listed,
     as_factor,
     in_si,
     kind_of,
@@ -45,7 +44,6 @@ from .proposals import BATCH, Point, Proposals, proposals, ranks
 HINT = "write load=0.5..0.9, policy=[fifo, lifo] or 'period={from: 1 s, to: 5 s, step: 1 s}'"
 _BARE = re.compile(r"[A-Za-z0-9_.+ -]+")  # a text that needs no quotes in YAML, where it is not a number
 _RANGE = re.compile(r"(.*?\S)\s*\.\.\s*(\S.*)")
-MAX_VALUES = 100_000  # of a list
 MAX_WHOLE, MAX_NUMBER = 10**15, 10**300  # of the ends of a range
 _DIGITS = 6  # of the width of a range, to which its numbers are drawn
 _OF_FAULTS = Position(COMMAND_LINE, 1, 1, 1, "--max-faults")
@@ -190,7 +188,7 @@ class Space:
     def dimensions(self, levels: Many[Level]) -> tuple[Dimension, ...]:
         """These points, as what a study varies."""
         at = self.axes[0].position if self.axes else _OF_FAULTS
-        return (Listed("point", at, self.columns, list(levels)),) if self.columns else ()
+        return (Dimension("point", at, self.columns, list(levels)),) if self.columns else ()
 
     def ends(self) -> tuple[Dimension, ...]:
         """The ends of each range and each value of each list: a study of which all conditions must load."""
@@ -198,7 +196,7 @@ class Space:
         for axis in self.axes:
             settings = [Setting(axis.path, each, axis.position) for each in axis.ends]
             levels = [Level((each,), {axis.path: axis.factor(each.node)}) for each in settings]
-            found.append(Listed(axis.path, axis.position, {axis.path: axis.kind}, levels))
+            found.append(Dimension(axis.path, axis.position, {axis.path: axis.kind}, levels))
         return tuple(found)
 
     def proposals(self, seed: int, together: int = BATCH) -> Proposals:
@@ -325,11 +323,6 @@ def _axis(setting: Setting, model: Model, problems: Problems) -> Axis | None:
     key = Scalar(setting.path, setting.path, True, setting.position)
     dimension = DimensionReader(problems).dimension(setting.path, Entry(key, node))
     if dimension is POISON:
-        return None
-    if dimension.size > MAX_VALUES:
-        problems.add(
-            f"{setting.path!r} has {dimension.size:,} values; at most {MAX_VALUES:,} are allowed", setting.position
-        )
         return None
     nodes = [each.node for at in range(dimension.size) for each in dimension.level(at).settings]
     kinds = {kind_of([each]) for each in nodes}

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 import sys
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
 from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass, field
 from decimal import Decimal
-from fractions import Fraction
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -58,35 +55,11 @@ class Level:
     disturb: tuple[str, ...] = ()
 
 
-class Dimension(ABC):
+class Dimension:
     """Levels by their number; ``columns`` are the table's columns that it fills, and what they hold (``KINDS``).
 
     ``design``, if there is one, says how the levels give sensitivity indices.
     """
-
-    design: Design | None = None
-
-    def __init__(self, name: str, position: Position, columns: dict[str, str]) -> None:
-        self.name = name
-        self.position = position
-        self.columns = columns
-
-    @property
-    @abstractmethod
-    def size(self) -> int:
-        """The number of levels, which may be too large for ``len``."""
-
-    @abstractmethod
-    def level(self, index: int) -> Level:
-        """One level."""
-
-    @abstractmethod
-    def find(self, values: AnyMapping[str, Factor]) -> int | None:
-        """The level that puts these values into its columns; None if there is none."""
-
-
-class Listed(Dimension):
-    """Levels that are written out, one by one."""
 
     def __init__(
         self,
@@ -96,62 +69,25 @@ class Listed(Dimension):
         levels: list[Level],
         design: Design | None = None,
     ) -> None:
-        super().__init__(name, position, columns)
+        self.name = name
+        self.position = position
+        self.columns = columns
         self.design = design
         self._levels = tuple(levels)
         self._places = {tuple(level.values.values()): index for index, level in enumerate(levels)}
 
     @property
     def size(self) -> int:
+        """The number of levels."""
         return len(self._levels)
 
     def level(self, index: int) -> Level:
+        """One level."""
         return self._levels[index]
 
     def find(self, values: AnyMapping[str, Factor]) -> int | None:
+        """The level that puts these values into its columns; None if there is none."""
         return self._places.get(tuple(values[name] for name in self.columns))
-
-
-class Ranged(Dimension):
-    """Numbers at equal distances, calculated in decimal so that 0.1, 0.2, 0.3 are exactly these."""
-
-    def __init__(
-        self, path: str, position: Position, start: Decimal, step: Decimal, size: int, unit: str, at: Position
-    ) -> None:
-        is_whole = not unit and all(each == each.to_integral_value() for each in (start, step))
-        is_whole = is_whole and max(abs(start), abs(start + (size - 1) * step)) < _MAX_WHOLE
-        super().__init__(path, position, {path: "int" if is_whole else "float"})
-        self._start, self._step, self._size, self._unit, self._at = start, step, size, unit, at
-
-    @property
-    def size(self) -> int:
-        return self._size
-
-    def level(self, index: int) -> Level:
-        value = self._number(index)
-        setting = Setting(self.name, number_node(value, self._unit, self._at), self.position)
-        return Level((setting,), {self.name: in_si(value, self._unit)})
-
-    def _number(self, index: int) -> int | float:
-        """The number of a level, in the unit of the range."""
-        number = self._start + index * self._step
-        return int(number) if self.columns[self.name] == "int" else float(number)
-
-    def _held(self, index: int) -> int | float:
-        """The number of a level, as the table holds it."""
-        return in_si(self._number(index), self._unit)
-
-    def is_distinct(self) -> bool:
-        """Whether no two levels are equal as floats: the ends, far from zero, are the likeliest to be."""
-        return all(self._held(at) != self._held(at + 1) for at in {0, self._size - 2} if 0 <= at < self._size - 1)
-
-    def find(self, values: AnyMapping[str, Factor]) -> int | None:
-        wanted = values[self.name]
-        if not isinstance(wanted, (int, float)) or (isinstance(wanted, float) and not math.isfinite(wanted)):
-            return None
-        first, last = (Fraction(self._held(at)) for at in (0, self._size - 1))
-        index = round((Fraction(wanted) - first) * (self._size - 1) / (last - first)) if self._size > 1 else 0
-        return index if 0 <= index < self._size and self._held(index) == wanted else None
 
 
 def number_node(value: float, unit: str, position: Position) -> Scalar:
@@ -209,9 +145,6 @@ def _quantity(node: Node) -> float | None:
         return Quantity(float(parts[0]), parts[1]).si
     except UnitError:
         return None
-
-
-MAX_LEVELS = 10**12  # of a range
 
 
 class DimensionReader(NodeReader):
@@ -272,7 +205,7 @@ class DimensionReader(NodeReader):
                     f"{name!r} takes the same value twice", nodes[0].position, f"first at {first.position}"
                 )
             levels.append(Level(tuple(Setting(path, node, keys[path]) for path, node in pairs), values))
-        return Listed(name, position, kinds, levels)
+        return Dimension(name, position, kinds, levels)
 
     def zipped(self, name: str, position: Position, node: Node) -> Dimension | Poison:
         """Parameters that vary together: the first values of all lists, then the second ones, and so on."""
@@ -295,7 +228,7 @@ class DimensionReader(NodeReader):
             elif not is_empty(entry.value):
                 self.problems.add(f"case {case!r} is not a mapping from parameters to values", entry.value.position)
             levels.append(Level(tuple(settings), {name: case}))
-        return Listed(name, position, {name: "text"}, levels)
+        return Dimension(name, position, {name: "text"}, levels)
 
     def ranged(self, name: str, position: Position, node: Mapping) -> Dimension | Poison:
         """``{from: 0, to: 0.5, step: 0.1}``; the end counts if a step falls on it."""
@@ -317,17 +250,23 @@ class DimensionReader(NodeReader):
         if step == 0 or (end - start) / step < 0:
             return self.problems.add(f"{what} never reaches {end} from {start} in steps of {step}", at)
         size = int((end - start) / step) + 1
-        if size > MAX_LEVELS:
-            return self.problems.add(f"{what} has more than {MAX_LEVELS:,} values", at)
-        made = Ranged(name, position, start, step, size, unit, node.position)
+        if size > MAX_SAMPLES:
+            return self.problems.add(f"{what} has more than {MAX_SAMPLES:,} values", at)
+        exact = [start + index * step for index in range(size)]  # so that 0.1, 0.2, 0.3 are the nearest floats
+        is_whole = not unit and start == int(start) and step == int(step)
+        is_whole = is_whole and max(abs(start), abs(exact[-1])) < _MAX_WHOLE
+        levels = []
         try:
-            is_distinct = made.is_distinct()
+            for each in exact:
+                value: int | float = int(each) if is_whole else float(each)
+                setting = Setting(name, number_node(value, unit, node.position), position)
+                levels.append(Level((setting,), {name: in_si(value, unit)}))
         except UnitError as error:
             return blame(self.problems, what, error, at)
-        if not is_distinct:
+        if len({level.values[name] for level in levels}) < size:
             reach = f"from {start} to {end} in steps of {step}"
             return self.problems.add(f"{what} has values that cannot be told apart as floats: {reach}", at)
-        return made
+        return Dimension(name, position, {name: "int" if is_whole else "float"}, levels)
 
     def quantity(self, node: Node, what: str) -> tuple[Decimal, str] | Poison:
         """A number, perhaps with a unit."""
@@ -382,7 +321,7 @@ class DimensionReader(NodeReader):
         numbers = tuple(tuple(places.setdefault(point, len(places)) for point in block) for block in blocks)
         levels = [_level_at(point, box) for point in places]
         design = Design(form, tuple(box), numbers, taken) if form in (SOBOL, MORRIS) else None
-        return Listed(name, position, dict.fromkeys(box, "float"), levels, design)
+        return Dimension(name, position, dict.fromkeys(box, "float"), levels, design)
 
     def box(self, name: str, node: Node) -> dict[str, Bounds] | Poison:
         """``path: [low, high]`` for each parameter."""

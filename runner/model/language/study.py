@@ -17,7 +17,7 @@ from ..text.limits import MAX_SEED
 from ..text.problems import POISON, Poison, Position, Problems
 from ..text.reading import NodeReader, Text, is_empty
 from .claims import Questions
-from .dimensions import DIMENSIONS, Dimension, Level, Listed
+from .dimensions import DIMENSIONS, Dimension, Level
 from .fields import (
     FLAG,
     LABEL,
@@ -304,7 +304,7 @@ class _StudyReader(NodeReader):
                     named_file(text, self.path.parent, "disturbance", self.problems)
             names = [str(self.path.parent / each.text) if is_path(each.text) else each.text for each in texts]
             levels.append(Level((), {"disturb": variant}, tuple(names)))
-        return [Listed(what, node.position, {"disturb": "text"}, levels)] if levels else []
+        return [Dimension(what, node.position, {"disturb": "text"}, levels)] if levels else []
 
     # -- what is kept ---------------------------------------------------------------------------------------------
 

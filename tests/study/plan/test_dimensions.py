@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from epicycle.runner.model.language.dimensions import Ranged
+from epicycle.runner.model.language.dimensions import Dimension
 from tests.study.study_parts import plan_of, write
 
 HEAD = "study: s\nmodel: ./walk.yaml\n"
@@ -52,7 +52,7 @@ def test_levels_are_what_the_form_says(vary: str, expected: list[dict[str, Any]]
 def test_the_levels_of_a_claim_are_looked_up_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Not anew for each level that the claim names, of which there may be thousands."""
     made: list[int] = []
-    monkeypatch.setattr(Ranged, "level", lambda self, at, level=Ranged.level: made.append(at) or level(self, at))
+    monkeypatch.setattr(Dimension, "level", lambda self, at, level=Dimension.level: made.append(at) or level(self, at))
     few = ", ".join(map(str, range(100)))
     claims = f"claims: {{c: {{less: place, at: {{drift: [{few}]}}}}}}\n"
     plan_of(write(tmp_path, f"{HEAD}metrics: [place]\nvary: {{drift: {{from: 0, to: 199, step: 1}}}}\n{claims}"))
