@@ -249,7 +249,8 @@ class Parameter(Generic[T]):
                 return value
         elif isinstance(value, (int, float, np.integer, np.floating, str)) and not isinstance(value, bool):
             return self._bounded(self._number(value))
-        raise ParameterError(f"{brief(value)} is not {self._expected()}")
+        hints = [f"the choices are texts: write '{brief(value)}' in quotes"] if brief(value) in self.choices else []
+        raise ParameterError(f"{brief(value)} is not {self._expected()}", help=hints)
 
     def _number(self, value: Any) -> float | int:
         unit = self.unit or ("1" if self.type is int and isinstance(value, Quantity) else "")
@@ -345,7 +346,7 @@ class Configurable:
     # Attributes that its copies, for a run or a snapshot, share with it.
     copies_share: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(self, **values: object) -> None:
+    def __init__(self, /, **values: object) -> None:  # of which one may be called 'self', by mistake
         self._configure(values)
         self.check()
 

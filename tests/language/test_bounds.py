@@ -54,6 +54,7 @@ def test_bounds_that_are_inherited(wait: str, tmp_path: Path) -> None:
         ({"bounds": "max: 500 m"}, "far: 1 is out of bounds, expected a number in km <= 0.5"),
         ({"bounds": "min: 2 km"}, "far: 1 is out of bounds, expected a number in km >= 2"),
         ({"bounds": "min: 2 km, max: 1500 m"}, "parameter 'far': min is greater than max"),
+        ({"bounds": "above: 2 km, max: 2000 m"}, "parameter 'far': above is not less than max"),
         ({"bounds": "min: 2 s"}, "parameter 'far': '2 s' is a time, expected a length in km"),
         ({"bounds": "min: 2 foo"}, "min of parameter 'far': '2 foo' has the unknown unit 'foo'"),
         ({"wait": "7 ms"}, "s.wait: 7 is out of bounds, expected a number in ms from 1 to 6"),

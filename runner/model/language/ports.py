@@ -164,12 +164,15 @@ class ParameterText:
         )
         if low is not None and high is not None and low > high:
             raise UnitError("min is greater than max")
+        if above is not None and high is not None and above >= high:
+            raise UnitError("above is not less than max")
         return low, above, high
 
 
 PARAMETER = Record.of(
     ParameterText, called="{key} of {what}", type=["object", "array", "string", "number", "boolean", "null"]
 )
+BOUNDS = ("min", "above", "max")
 _NO_PARAMETERS = {"index", *CONSTANTS, *FUNCTIONS}
 
 
@@ -194,13 +197,18 @@ def _parameter(reader: NodeReader, name: str, entry: Entry) -> ParameterText:
     entries = PARAMETER.entries(reader, entry.value, what) or {}
     said = PARAMETER.values(reader, entries, what, entry.key.position)
     found = ParameterText(name, entry.key.position, **sound(said), given=tuple(entries))
+    literal = found.value.value if isinstance(found.value, Scalar) else None
+    other = "'choices'" if "choices" in entries else "true or false" if isinstance(literal, bool) else ""
+    for key in (each for each in ("unit", *BOUNDS) if other and each in entries):
+        message, at = f"{what}: {key!r} cannot be used with {other}", entries[key].key.position
+        said[key] = reader.problems.add(message, at, f"leave {key!r} out")
     if POISON in said.values():
         return replace(found, value=POISON)
     if found.unit or not {type(found.min), type(found.above), type(found.max)} & {str}:  # otherwise it may be inherited
         try:
             found.bounds()
         except UnitError as error:
-            at = next(key for key in ("min", "above", "max") if key in entries)
+            at = next(key for key in BOUNDS if key in entries)
             return replace(found, value=blame(reader.problems, what, error, entries[at].value))
     return found
 

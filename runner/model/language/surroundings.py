@@ -33,12 +33,11 @@ from ..text.program import node_of
 from ..text.reading import NodeReader, Text
 from .models import CompositeText, ModelText
 from .parts import PartText
-from .ports import ParameterText
+from .ports import BOUNDS, ParameterText
 from .usage import ALL, used_names
 
 _ALONE = re.compile(r"\$\{\s*([A-Za-z_][A-Za-z0-9_]*)\s*\}")  # a value that is a parameter, unchanged
 _LOWER = ("min", "above")
-_BOUNDS = (*_LOWER, "max")
 
 Known: TypeAlias = ParameterText | Parameter[Any]
 Takers: TypeAlias = dict[str, list[tuple[str, Known]]]  # by name, who takes a value unchanged: as Type.name
@@ -290,10 +289,10 @@ def _variant(known: Known, node: MappingNode) -> type | None:
 def _about(known: Known, position: Position) -> dict[str, Any]:
     """What a declaration says besides the default."""
     if isinstance(known, ParameterText):
-        return {key: getattr(known, key) for key in ("unit", *_BOUNDS, "choices", "doc")}
+        return {key: getattr(known, key) for key in ("unit", *BOUNDS, "choices", "doc")}
     found: dict[str, Any] = {"doc": known.doc}
     if not known.forms and known.type in (float, int, int | float):
-        found |= {key: getattr(known, key) for key in ("unit", *_BOUNDS)}
+        found |= {key: getattr(known, key) for key in ("unit", *BOUNDS)}
     elif not known.forms and known.choices:
         found["choices"] = {each: Text(each, position) for each in known.choices}
     return found

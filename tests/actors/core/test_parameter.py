@@ -178,6 +178,11 @@ def test_what_a_program_may_write_instead(values: dict[str, Any], kind: str, mea
         ({"fro": 1}, "Whole has no parameter 'fro', did you mean 'from'? valid parameters: from, part, list", ("fro",)),
         ({"zzz": 1}, "Whole has no parameter 'zzz'; valid parameters: from, part, list", ("zzz",)),
         ({"from": "x"}, "Whole.from: 'x' is not a number", ("from",)),
+        (
+            {"from": 1, "part": {"type": "Wheel", "self": 1}},
+            "Whole.part: Wheel has no parameter 'self'; valid parameters: size, name",
+            ("part", "self"),
+        ),
         ({"from": 1, "part": 3}, "Whole.part: 3 is not a mapping {type: ...} with one of the types Wheel", ("part",)),
         ({"from": 1, "part": {}}, "Whole.part: {} has no 'type'; expected one of Wheel", ("part",)),
         (
