@@ -89,7 +89,7 @@ class Pointcuts(View):
 
     def _ports_of(self, pointcut: PointcutText) -> list[str] | Poison:
         """The ports that the aspect can attach to, of those that one pointcut selects."""
-        found = self._matching(pointcut) if pointcut.text else self._chosen(pointcut)
+        found = self._matching(pointcut) if pointcut.is_pattern else self._chosen(pointcut)
         fitting = [port for port in found or () if self._fits(port)]
         if found and not fitting:
             where = " or ".join(sorted(self.cls.stands_at))
@@ -291,13 +291,13 @@ class Pointcuts(View):
         for key, said in (("port", pointcut.port), ("parameter", pointcut.parameter)):
             if said is not None:
                 self.tell(f"{name} attaches to actors, not to their {key}s", said, f"leave {key!r} out")
-        if not text:
+        if not pointcut.is_pattern:
             owners = self._chosen_owners(pointcut)
             return POISON if owners is POISON else sorted(owners)
         if pointcut.ends is not None:
             receiver = paths.parent(pointcut.ends[1])
-            hint = f"write {receiver!r} for the receiving actor"
-            return self.tell(f"{name} attaches to actors, not to connections", pointcut, hint)
+            hints = (f"write {receiver!r} for the receiving actor",) if receiver else ()
+            return self.tell(f"{name} attaches to actors, not to connections", pointcut, *hints)
         full = self._full(text)
         try:
             found, ports = index.select(full), self.ports.select(full)

@@ -125,6 +125,9 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> ModelText
             problems.add(f"{part!r} is not of the form key=value", position)
             return text
         stop = len(option) - len(rest) + end
+        if key in values or (key == "at" and at is not None):
+            problems.add(f"{key!r} is given twice", in_option(option, stop - len(part), len(part)))
+            return text
         if key == "at":
             at = _pointcuts(value, option, stop - len(value))
             continue

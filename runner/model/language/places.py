@@ -263,6 +263,11 @@ class PointcutText:
         return cls(pattern, text.position, exclude, (left.strip(), right.strip()) if arrow else None)
 
     @property
+    def is_pattern(self) -> bool:
+        """Whether it selects by a pattern, not by a type or tag."""
+        return self.type is None and self.tag is None
+
+    @property
     def head(self) -> str:
         """The actor that it names first."""
         return self.text.partition(".")[0].partition("[")[0]
