@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from epicycle.actors import normal_quantile, random_stream
@@ -129,6 +129,21 @@ def paired_difference(first: dict[int, float], second: dict[int, float], level: 
     if min(gaps) == max(gaps):
         return Difference(estimate, 1.0 if gaps[0] == 0 else math.ldexp(1.0, 1 - len(gaps)))
     return Difference(estimate, 2.0 * student_tail(abs(estimate.value) / estimate.error, len(gaps) - 1))
+
+
+def share_above(limit: float, values: Sequence[float], level: float = LEVEL) -> Difference:
+    """How much greater the share of ones is than a limit, with the test that Wilson's interval belongs to.
+
+    Student's variable is normal, to seven digits, with so many degrees of freedom.
+    """
+    found = average(values, level, is_share=True)
+    shifted = replace(found, value=found.value - limit, low=found.low - limit, high=found.high - limit)
+    if found.count == 0:
+        return Difference(shifted, math.nan)
+    if not 0.0 < limit < 1.0:
+        return Difference(shifted, 1.0 if found.value == limit else 0.0)
+    error = math.sqrt(limit * (1.0 - limit) / found.count)
+    return Difference(shifted, 2.0 * student_tail(abs(shifted.value) / error, 10**9))
 
 
 def without_rounding(values: Iterable[float], scale: float) -> list[float]:

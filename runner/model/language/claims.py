@@ -55,12 +55,12 @@ class Claim:
     condition: str = ""
     at: Selection = keyed(
         _levels("at"),
-        "Where they are less, or greater: 'factor: level' or 'factor: [level, ...]'.",
+        "Where they are less, or greater: 'factor: level' or 'factor: [level, ...]' (default, with a number: all).",
         default_factory=dict,
     )
-    than: Selection | None = keyed(
-        _levels("than"),
-        "What they are compared with (default: all other levels, so that these are the best).",
+    than: Selection | float | None = keyed(
+        Reader({"anyOf": [{"type": "number"}, _LEVELS]}, lambda reader, node, what: reader.than(node, what)),
+        "What they are compared with: levels, or a number (default: all other levels, so that these are the best).",
         default=None,
     )
     over: str = keyed(_trend("over"), "The factor over which something rises or falls.", default="")
@@ -91,8 +91,11 @@ class Claim:
         if self.form in (RISES, FALLS):
             what = f"the slope of {metrics} over {words(self.per)}" if self.per else metrics
             return f"{what} {self.form} over {words(self.over)}{where}"
+        at = f" at {_shown(self.at, words)}" if self.at else ""
+        if isinstance(self.than, float):
+            return f"{metrics} is {self.form} than {self.than:g}{at}{share}{where}"
         than = "any other level" if self.than is None else _shown(self.than, words)
-        return f"{metrics} is {self.form} at {_shown(self.at, words)} than at {than}{share}{where}"
+        return f"{metrics} is {self.form}{at} than at {than}{share}{where}"
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from ..text.problems import POISON, Poison, Position, Problems
 from ..text.reading import NodeReader, Text, inside
 from .claims import ALWAYS, FALLS, FORMS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection, shown_level
 from .dimensions import Dimension, Factor, as_factor
-from .fields import TEXTS, Field, Reader, Record, names_of, node_as, ref
+from .fields import TEXTS, Field, Reader, Record, Schema, names_of, node_as, ref
 from .files import named_file
 
 MAX_CONDITIONS = 10_000  # of a study with claims or a guideline, which evaluate all of them
@@ -134,9 +134,10 @@ class QuestionReader(NodeReader):
         for key in entries.keys() - {"doc", form, *FORMS[form]}:
             message, takes = f"{what}: {key!r} cannot be used with {form!r}", ", ".join(FORMS[form])
             wrong.append(self.problems.add(message, entries[key].key.position, f"{form!r} takes: {takes}"))
-        for key in {"at", "over"} & set(FORMS[form]) - entries.keys():
-            example = "at: {load: 0.5}" if key == "at" else "over: load"
-            wrong.append(self.problems.add(f"{what} has no {key!r}", position, f"for example, add {example!r}"))
+        is_apart = "than" in entries and isinstance(entries["than"].value, Scalar)  # compared with no level
+        for key in {"at", "over"} & set(FORMS[form]) - entries.keys() - ({"at"} if is_apart else set()):
+            example = "'at: {load: 0.5}', or a number: 'than: 0.9'" if key == "at" else "'over: load'"
+            wrong.append(self.problems.add(f"{what} has no {key!r}", position, f"for example, add {example}"))
         if wrong:
             return POISON
         said = CLAIM.values(self, entries, what, position)
@@ -146,7 +147,7 @@ class QuestionReader(NodeReader):
             return POISON
         condition, metrics = said.pop(form) if form == ALWAYS else ("", said.pop(form))
         at, than = said.get("at", {}), said.get("than")
-        if than is not None and than.keys() != at.keys():
+        if isinstance(than, dict) and than.keys() != at.keys():
             message = f"{what}: 'at' and 'than' name different factors"
             hint = f"at: {', '.join(at)}; than: {', '.join(than) or 'none'}"
             return self.problems.add(message, entries["than"].key.position, hint)
@@ -186,6 +187,17 @@ class QuestionReader(NodeReader):
         if any(POISON in levels for levels in found.values()):
             return POISON
         return {factor: tuple(dict.fromkeys(level[0] for level in levels if level)) for factor, levels in found.items()}
+
+    def than(self, node: Node, what: str) -> Selection | float | Poison:
+        """Levels, or a number, which has the unit of the metric."""
+        if not isinstance(node, Scalar):
+            return self.selection(node, what, "than")
+        value = node.value
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+            return float(value)
+        message = f"{what}: 'than' is neither a finite number nor a mapping from factors to levels"
+        hint = "write a number without a unit, which is that of the metric, or levels such as {load: [0.5, 0.7]}"
+        return self.problems.add(message, node.position, hint)
 
     def level(self, factor: str, known: list[Factor], node: Node, what: str) -> tuple[Factor] | Poison:
         """The level that a node names, of those that a factor takes, as the table holds it."""
@@ -243,7 +255,8 @@ class QuestionReader(NodeReader):
                 if len(set(claim.where.get(name, levels_of(self.dimensions, name)))) < 2:
                     self.problems.add(f"{what}: {name} has only one level, so there is nothing to compare", position)
         elif claim.form in (LESS, GREATER):
-            for key, selection in (("at", claim.at), ("than", claim.than or {})):
+            than = claim.than if isinstance(claim.than, dict) else {}
+            for key, selection in (("at", claim.at), ("than", than)):
                 for name, levels in selection.items():
                     if not set(levels) <= set(claim.where.get(name, levels)):
                         self.problems.add(f"{what}: 'where' excludes a level of {name} that {key!r} names", position)
@@ -252,7 +265,7 @@ class QuestionReader(NodeReader):
                 for name, levels in claim.at.items()
             ):
                 self.problems.add(f"{what}: there are no other levels to compare with", position)
-            if claim.than is not None and all(set(claim.at[name]) & set(claim.than[name]) for name in claim.at):
+            if than and all(set(claim.at[name]) & set(than[name]) for name in claim.at):
                 self.problems.add(f"{what}: compares a level with itself", position)
 
     # -- the guideline --------------------------------------------------------------------------------------------
@@ -278,14 +291,16 @@ class QuestionReader(NodeReader):
 
 
 _METRICS = TEXTS.described({"anyOf": [ref("name"), {"type": "array", "items": ref("name"), "minItems": 1}]})
+_MEAN = "Metrics whose mean is {} at some levels than at others, or than a number."
 _TREND = "Metrics whose mean, or slope per unit of another factor, {} over the levels of a factor."
+_APART: Schema = {"anyOf": [{"required": ["at"]}, {"required": ["than"], "properties": {"than": {"type": "number"}}}]}
 _OF_CLAIM = Record.of(Claim, called="{what}").keys
 CLAIM = Record(
     "A hypothesis on the results.",
     {
         "doc": _OF_CLAIM["doc"],
-        LESS: Field(_METRICS, "Metrics whose mean is less at some levels than at others.", "{what}"),
-        GREATER: Field(_METRICS, "Metrics whose mean is greater at some levels than at others.", "{what}"),
+        LESS: Field(_METRICS, _MEAN.format(LESS), "{what}"),
+        GREATER: Field(_METRICS, _MEAN.format(GREATER), "{what}"),
         RISES: Field(_METRICS, _TREND.format(RISES), "{what}"),
         FALLS: Field(_METRICS, _TREND.format(FALLS), "{what}"),
         ALWAYS: Field(
@@ -296,7 +311,13 @@ CLAIM = Record(
         **_OF_CLAIM,
     },
     type="object",
-    oneOf=[{"required": [form, *(key for key in takes if key in ("at", "over"))]} for form, takes in FORMS.items()],
+    oneOf=[
+        {"required": [LESS], **_APART},
+        {"required": [GREATER], **_APART},
+        {"required": [RISES, "over"]},
+        {"required": [FALLS, "over"]},
+        {"required": [ALWAYS]},
+    ],
 )
 GUIDELINE = Record.of(
     Guideline, type="object", required=["choose"], oneOf=[{"required": ["least"]}, {"required": ["greatest"]}]

@@ -51,7 +51,8 @@ def claims(names: Names, judgements: Sequence[ClaimVerdict]) -> Iterable[Html]:
     ]
     yield wide_table([*head, "weakest comparison"], rows, names=len(apart) + 1, class_="words")
     yield note(
-        "A comparison is a mean of differences between runs of the same replication, with Student's 95 % interval; "
+        "A comparison is a mean of differences between runs of the same replication, or a mean less a number, with "
+        "Student's 95 % interval (of shares Wilson's); "
         "the p-values of one claim are corrected together (Holm). It is confirmed or reversed if the corrected "
         "p-value is below 0.05, and at most one run in twenty is missing; otherwise it is undecided. Agreeing "
         "comparisons point the claimed way, by chance or not."
@@ -126,6 +127,9 @@ def _compared(names: Names, judgement: ClaimVerdict, finding: ContrastTest) -> s
     what = names.axis(finding.metric)
     if claim.per:
         what = f"slope of {names.words(finding.metric)} over {names.words(claim.per)}"
+    if isinstance(claim.than, float):
+        here = ", ".join(each for each in (names.place(finding.level), where) if each)
+        return f"{what} less {claim.than:g}{f'; {here}' if here else ''}"
     pair = f"{what}, {names.place(finding.level)} less {names.place(finding.against)}"
     return f"{pair}; {where}" if where else pair
 

@@ -1,7 +1,8 @@
 """Judging claims: each is split into comparisons, each with its interval and a corrected test.
 
-A comparison is a contrast, a weighted sum of conditions over common replications: the difference of two conditions, or
-of two slopes.  Its mean has Student's interval and test; the p-values of a claim are corrected together (Holm).
+A comparison is a contrast, a weighted sum of conditions over common replications: the difference of two conditions, of
+two slopes, or of a condition and a number.  Its mean has Student's interval and test, a share Wilson's interval and its
+test; the p-values of a claim are corrected together (Holm).
 
 Sources: A. M. Law, *Simulation Modeling and Analysis*, 10.2 (paired comparisons under common random numbers);
 S. Holm, *A simple sequentially rejective multiple test procedure* (1979); E. B. Wilson, *Probable inference* (1927).
@@ -20,7 +21,7 @@ from epicycle.actors.expression import Formula
 from ...model.language.claims import ALWAYS, FALLS, GREATER, RISES, Claim, Selection
 from ...model.language.dimensions import Factor
 from ...support.shown import finite
-from ..inference import LEVEL, holm, paired_difference, rate, without_rounding
+from ..inference import LEVEL, holm, paired_difference, rate, share_above, without_rounding
 from .samples import Levels, Place, Samples, has_enough, value_in
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "undecided"
@@ -34,9 +35,9 @@ Choices = Sequence[Sequence[int]]  # levels, by dimension
 class ContrastTest:
     """The result of one comparison: how much greater ``metric`` is at ``level`` than ``against`` another, ``where``.
 
-    For a condition that should always hold, ``metric`` is the condition, and ``value`` the share of runs in which it
-    holds.  ``count`` runs or pairs have a number, ``missing`` have none.  ``outcome`` is ``confirmed``, ``reversed`` or
-    ``undecided``.
+    Compared with a number, it is how much greater than that, and ``against`` is empty.  For a condition that should
+    always hold, ``metric`` is the condition, and ``value`` the share of runs in which it holds.  ``count`` runs or
+    pairs have a number, ``missing`` have none.  ``outcome`` is ``confirmed``, ``reversed`` or ``undecided``.
     """
 
     metric: str
@@ -204,7 +205,8 @@ def verdict(claim: Claim, findings: Sequence[ContrastTest]) -> str:
 def _comparisons(claim: Claim, where: Selection, samples: Samples) -> Iterator[ContrastTest]:
     """A comparison counts if it is significant and few numbers are missing."""
     contrasts = list(_contrasts(claim, where, samples))
-    findings = [_finding(metric.text, *each, samples) for metric in claim.metrics for each in contrasts]
+    limit = claim.than if isinstance(claim.than, float) else 0.0
+    findings = [_finding(metric.text, *each, limit, samples) for metric in claim.metrics for each in contrasts]
     for each, p in zip(findings, holm([finding.p for finding in findings]), strict=True):
         outcome = UNDECIDED
         if each.has_enough and p < 1 - LEVEL:
@@ -231,23 +233,29 @@ def _contrasts(
             weights = {
                 samples.at(_with(rest, homes, (*levels, *inner))): sign * weight
                 for sign, levels in ((1.0, this), (-1.0, that))
+                if levels is not None
                 for inner, weight in slope.items()
                 if weight
             }
-            here, there = (samples.values(_with(rest, compared, side), compared) for side in (this, that))
+            here, there = (
+                {} if side is None else samples.values(_with(rest, compared, side), compared) for side in (this, that)
+            )
             yield weights, (samples.values(rest, others), here, there)
 
 
-def _pairs(claim: Claim, choices: Choices, homes: Sequence[int], samples: Samples) -> Iterator[tuple[Place, Place]]:
-    """Each level of ``at`` with each level of ``than``."""
+def _pairs(
+    claim: Claim, choices: Choices, homes: Sequence[int], samples: Samples
+) -> Iterator[tuple[Place, Place | None]]:
+    """Each level of ``at`` with each level of ``than``, or with none if that is a number."""
 
     def levels(selection: Selection) -> list[Place]:
         within = samples.choices(selection)
         return list(product(*([each for each in choices[home] if each in within[home]] for home in homes)))
 
-    these, those = levels(claim.at), levels(claim.than or {})
-    if claim.than is None:
-        those = [each for each in those if each not in these]
+    these = levels(claim.at)
+    those: list[Place | None] = [None]
+    if not isinstance(claim.than, float):
+        those = [each for each in levels(claim.than or {}) if claim.than or each not in these]
     yield from product(these, those)
 
 
@@ -271,15 +279,18 @@ def _slope(claim: Claim, choices: Choices, samples: Samples) -> dict[Place, floa
 
 
 def _finding(
-    metric: str, weights: dict[int, float], levels: tuple[Levels, Levels, Levels], samples: Samples
+    metric: str, weights: dict[int, float], levels: tuple[Levels, Levels, Levels], limit: float, samples: Samples
 ) -> ContrastTest:
-    """The mean of a contrast over the replications in which all its conditions have a number."""
+    """The mean of a contrast, less the ``limit``, over the replications in which all its conditions have a number."""
     numbers = {each: samples.numbers(each, metric) for each in weights}
     over = set.intersection(*(set(samples.over(each)) for each in weights))
     pairs = sorted(set.intersection(*(set(each) for each in numbers.values())))
-    terms = [[weight * numbers[at][each] for at, weight in weights.items()] for each in pairs]
+    terms = [[*(weight * numbers[at][each] for at, weight in weights.items()), -limit] for each in pairs]
     values = without_rounding(map(math.fsum, terms), max((abs(term) for each in terms for term in each), default=0.0))
-    found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)))
+    if len(weights) == 1 and metric in samples.shares:
+        found = share_above(limit, [numbers[at][each] for at in weights for each in pairs])
+    else:
+        found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)))
     return ContrastTest(
         metric,
         *levels,

@@ -100,6 +100,47 @@ def test_comparisons_are_scipys_paired_tests() -> None:
     assert larger[1] == pytest.approx(max(2 * smaller[0], larger[0]))
 
 
+def test_a_mean_against_a_number_is_scipys_test_of_one_sample() -> None:
+    found = one("greater: wait, than: 12, at: {servers: 3}, where: {load: [0.5, 0.7]}", grows)
+    samples = table("", grows)
+    for finding, at in zip(found.findings, (2, 6), strict=True):
+        test = stats.ttest_1samp(list(samples.numbers(at, "wait").values()), 12.0)
+        low, high = test.confidence_interval(0.95)
+        assert (finding.p, finding.low, finding.high) == pytest.approx((test.pvalue, low - 12, high - 12))
+    assert [(each.where, each.level, each.against) for each in found.findings] == [
+        ({"load": 0.5}, {"servers": 3}, {}),
+        ({"load": 0.7}, {"servers": 3}, {}),
+    ]  # the true means are 19 and 26
+    assert (found.verdict, found.agreeing) == ("reproduced", 2)
+    assert found.claim.statement == "wait is greater than 12 at servers=3, where load=0.5 or 0.7"
+    everywhere = one("less: wait, than: 12", grows)
+    assert (everywhere.verdict, len(everywhere.findings)) == ("not reproduced", 12)
+    assert everywhere.claim.statement == "wait is less than 12"
+    assert one("less: wait, than: 19, where: {load: 0.5, servers: 3}", grows).verdict == "undecided"
+
+
+@pytest.mark.parametrize(("ones", "verdict"), [(97, "reproduced"), (93, "undecided"), (80, "not reproduced")])
+def test_a_share_against_a_number_agrees_with_wilsons_interval(ones: int, verdict: str) -> None:
+    study = study_of("claims: {c: {greater: wait, than: 0.9, where: {load: 0.5, servers: 1}}}")
+    rows = {"condition": [0] * 100, "replication": list(range(100)), "status": ["ok"] * 100}
+    found = pa.table({**rows, "wait": [float(each < ones) for each in range(100)]})
+    (judged,) = judge(Samples(study, found, {"wait"}))
+    (finding,) = judged.findings
+    interval = stats.binomtest(ones, 100).proportion_ci(0.95, method="wilson")
+    assert (finding.low + 0.9, finding.high + 0.9) == pytest.approx((interval.low, interval.high))
+    assert finding.p == pytest.approx(2 * stats.norm.sf(abs(ones / 100 - 0.9) / 0.03), rel=1e-6)
+    assert judged.verdict == verdict
+    assert (finding.p < 0.05) == (finding.low > 0 or finding.high < 0)
+
+
+def test_few_runs_that_all_hold_do_not_confirm_a_share() -> None:
+    study = study_of("claims: {c: {greater: wait, than: 0.9, where: {load: 0.5, servers: 1}}}")
+    rows = {"condition": [0] * 8, "replication": list(range(8)), "status": ["ok"] * 8, "wait": [1.0] * 8}
+    assert [each.verdict for each in judge(Samples(study, pa.table(rows), {"wait"}))] == ["undecided"]
+    impossible = study_of("claims: {c: {less: wait, than: 1, where: {load: 0.5, servers: 1}}}")
+    assert [each.verdict for each in judge(Samples(impossible, pa.table(rows), {"wait"}))] == ["undecided"]
+
+
 def test_slopes_are_scipys_regressions() -> None:
     found = one("rises: wait, per: servers, over: load", grows)
     samples = table("", grows)
