@@ -341,6 +341,8 @@ class Configurable:
     reserved: ClassVar[frozenset[str]] = frozenset({"type", "count", "priority", "tags", "inherit"})
     # Inherited parameters that would do nothing: 'inherit: all' of a model leaves them out.
     unused: ClassVar[tuple[str, ...]] = ()
+    # What messages call one of a class whose name no text says, such as 'a transition': its parameters are keys.
+    written_as: ClassVar[str] = ""
     # Advice for names that might be mistaken for parameters.
     refused: ClassVar[Mapping[str, str]] = {}
     # Attributes that its copies, for a run or a snapshot, share with it.
@@ -363,7 +365,8 @@ class Configurable:
         for name in values:
             if name not in declared:
                 has_guess = name not in self.refused and bool(did_you_mean(name, declared))  # which ends a sentence
-                valid = f"{'' if has_guess else ';'} valid parameters: {', '.join(declared) or 'none'}"
+                noun = "keys" if self.written_as else "parameters"
+                valid = f"{'' if has_guess else ';'} valid {noun}: {', '.join(declared) or 'none'}"
                 raise ParameterError(
                     unknown_parameter(type(self), name) + valid,
                     (name,),
@@ -375,7 +378,7 @@ class Configurable:
         for name, parameter in declared.items():
             if name not in values:
                 if parameter.required:
-                    faults.append(Fault(f"{type(self).__name__} needs a value for {name!r}"))
+                    faults.append(Fault(f"{self.written_as or type(self).__name__} needs a value for {name!r}"))
                 else:
                     parameter.store(self, parameter.default_value)
                 continue
@@ -419,9 +422,13 @@ def declared_parameters(cls: type) -> Mapping[str, Parameter[Any]]:
 
 def unknown_parameter(cls: type, name: str) -> str:
     """The message for a parameter that the class does not have."""
-    if issubclass(cls, Configurable) and name in cls.refused:
-        return cls.refused[name]
-    return f"{cls.__name__} has no parameter {name!r}{did_you_mean(name, declared_parameters(cls))}"
+    what = f"{cls.__name__} has no parameter"
+    if issubclass(cls, Configurable):
+        if name in cls.refused:
+            return cls.refused[name]
+        if cls.written_as:
+            what = f"{cls.written_as} has no key"
+    return f"{what} {name!r}{did_you_mean(name, declared_parameters(cls))}"
 
 
 def build_variant(base: type, value: object, unit: str = "") -> object:

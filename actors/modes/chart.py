@@ -107,8 +107,8 @@ class Chart:
 
     def _known(self, where: str, mode: str, *keys: str | int) -> str:
         if mode not in self.modes:
-            near = did_you_mean(mode, self.modes)
-            raise ParameterError(f"{where}: there is no mode {mode!r}{near}; modes: {', '.join(self.modes)}", keys)
+            near = did_you_mean(mode, self.modes) or ";"
+            raise ParameterError(f"{where}: there is no mode {mode!r}{near} modes: {', '.join(self.modes)}", keys)
         return mode
 
     def _sources(self, rule: Rule) -> list[str]:

@@ -83,7 +83,7 @@ class ModalActor(Actor):
                 if name not in self.inputs:
                     valid = ", ".join(self.inputs) or "none"
                     near = did_you_mean(name, self.inputs)
-                    raise ParameterError(f"{rule}: there is no input {name!r}{near}; inputs: {valid}")
+                    raise ParameterError(f"{rule}: there is no input {name!r}{near or ';'} inputs: {valid}")
 
     # -- parts of a transition ------------------------------------------------------------------------------------
 

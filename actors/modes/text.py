@@ -124,6 +124,7 @@ def _moved(fault: Fault, offset: int, part: str) -> Fault:
 class Mode(Configurable):
     """The declaration of a mode."""
 
+    written_as = "a mode"
     refused: ClassVar[Mapping[str, str]] = {
         "refinement": "a mode of an actor has no refinement: write modes into a composite, beside its 'inputs'"
     }
@@ -140,6 +141,7 @@ class Mode(Configurable):
 class Transition(Configurable):
     """The declaration of a transition."""
 
+    written_as = "a transition"
     reserved: ClassVar[frozenset[str]] = frozenset()
 
     from_ = texts_parameter(doc="the modes that it leaves; * for all but its target")

@@ -348,7 +348,7 @@ def test_a_class_with_a_wrong_trigger_is_refused() -> None:
 
     with pytest.raises(ParameterError) as caught:
         Wrong("it")
-    assert str(caught.value) == "a -> a: there is no input 'buton', did you mean 'button'?; inputs: button"
+    assert str(caught.value) == "a -> a: there is no input 'buton', did you mean 'button'? inputs: button"
 
 
 # -- snapshots, crashes, traces -----------------------------------------------------------------------------------
