@@ -24,8 +24,8 @@ class TimeDelay(Actor):
     """Sends each token after a delay; with delay 0 at the next microstep.
 
     A token is delayed by the value of ``delay`` at its tag, so one may overtake another.  The output does not depend on
-    the inputs within the same tag, so the actor may be part of a loop.  Ptolemy: ``TimeDelay``, ``TimedDelay``,
-    ``VariableDelay``.
+    the inputs within the same tag, so the actor may be part of a loop.  A ``Server`` with ``servers: null`` draws the
+    delay of each token from a ``distribution``.  Ptolemy: ``TimeDelay``, ``TimedDelay``, ``VariableDelay``.
     """
 
     input = InputPort(doc="tokens to delay")

@@ -199,3 +199,32 @@ def test_a_part_that_another_parameter_takes(tmp_path: Path) -> None:
         "\n"
         "m.yaml:4:35: error: c.service_time: {'type': [1]} is not a number in s >= 0\n"
     )
+
+
+def test_a_distribution_that_no_parameter_takes(tmp_path: Path) -> None:
+    told = said(
+        "model: m\n"
+        "actors:\n"
+        "  b: {type: TimeDelay, delay: {type: Exponential, mean: 1 s}}\n"
+        "  c: {type: PoissonClock, mean_interval: {type: Uniform}}\n"
+        "  d: {type: Scale, factor: {type: Exponentiel}}\n",
+        tmp_path,
+    )
+    assert told == (
+        "m.yaml:3:31: error: b.delay: {'type': 'Exponential', 'mean': '1 s'} is not a number in s >= 0\n"
+        "    3 |   b: {type: TimeDelay, delay: {type: Exponential, mean: 1 s}}\n"
+        "      |                               ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^\n"
+        "   help: 'delay' is one number, or comes by the input b.delay: connect it to a {type: Random, distribution: "
+        "{type: Exponential, ...}}, which draws for each of its triggers\n"
+        "\n"
+        "m.yaml:4:42: error: c.mean_interval: {'type': 'Uniform'} is not a number in s > 0\n"
+        "    4 |   c: {type: PoissonClock, mean_interval: {type: Uniform}}\n"
+        "      |                                          ^^^^^^^^^^^^^^^\n"
+        "   help: 'mean_interval' is one number for the whole run; what varies is sent by a {type: Random, "
+        "distribution: {type: Uniform, ...}}, which draws for each of its triggers\n"
+        "\n"
+        "m.yaml:5:28: error: d.factor: {'type': 'Exponentiel'} is not a number\n"
+        "    5 |   d: {type: Scale, factor: {type: Exponentiel}}\n"
+        "      |                            ^^^^^^^^^^^^^^^^^^^\n"
+        "3 errors in m.yaml"
+    )

@@ -13,8 +13,11 @@ from typing import Any, TypeVar
 
 from epicycle.actors import (
     Configurable,
+    Distribution,
+    InputPort,
     Parameter,
     declared_parameters,
+    declared_ports,
     did_you_mean,
     nearest,
     paths,
@@ -135,7 +138,7 @@ class ParameterResolver(Values):
                 try:
                     declared[name].convert(found[name])
                 except Exception as error:
-                    hints = _taken_by(declared, name, found[name])
+                    hints = _where_it_belongs(cls, label, name, found[name])
                     self.blame(f"{label}.{name}", error, entry.value, known, *hints)
                     told = True
         if failure is not None and not told:
@@ -225,16 +228,20 @@ class ParameterResolver(Values):
         self.problems.add(message, setting.position, *(() if near else valid), kind=FROM_OUTSIDE)
 
 
-def _taken_by(declared: Mapping[str, Parameter[Any]], name: str, value: object) -> list[str]:
-    """Which other parameters take such a part: a distribution that is given as a number, say."""
+def _where_it_belongs(cls: type, label: str, name: str, value: object) -> list[str]:
+    """Which other parameters take such a part, a distribution that is given as a number, say; or what draws from it."""
     kind = value.get("type") if isinstance(value, Mapping) else None
+    if not isinstance(kind, str):
+        return []
+    declared = declared_parameters(cls)
     bases = {each: other.type for each, other in declared.items() if each != name and isinstance(other.type, type)}
-    takers = [
-        each
-        for each, base in bases.items()
-        if issubclass(base, Configurable) and isinstance(kind, str) and kind in variants(base)
-    ]
-    return [f"{kind} is a value of {each!r}: {each}: {{type: {kind}, ...}}" for each in takers]
+    takers = [each for each, base in bases.items() if issubclass(base, Configurable) and kind in variants(base)]
+    if takers or kind not in variants(Distribution) or declared[name].type not in (int, float, int | float):
+        return [f"{kind} is a value of {each!r}: {each}: {{type: {kind}, ...}}" for each in takers]
+    source = f"{{type: Random, distribution: {{type: {kind}, ...}}}}, which draws for each of its triggers"
+    if isinstance(declared_ports(cls).get(name), InputPort):
+        return [f"{name!r} is one number, or comes by the input {label}.{name}: connect it to a {source}"]
+    return [f"{name!r} is one number for the whole run; what varies is sent by a {source}"]
 
 
 def _in_terms_of(pattern: str, path: str) -> str:
