@@ -140,6 +140,17 @@ def test_figures_are_described_too(name: str, kind: str, capsys: pytest.CaptureF
     assert capsys.readouterr().err.splitlines()[0] == near
 
 
+def test_all_that_has_a_name_is_described(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = printed(capsys, "describe", "Histogram").splitlines()
+    heads = ["Histogram  actor, sinks", "Histogram  figure, figures"]
+    assert [line for line in lines if line.startswith("Histogram")] == heads
+    assert lines[lines.index(heads[1]) - 1] == ""
+    found = json.loads(printed(capsys, "describe", "Histogram", "--json"))
+    assert (found["kind"], [each["kind"] for each in found["also"]]) == ("actor", ["figure"])
+    assert [each["name"] for each in found["also"][0]["parameters"]] == ["signals", "bins", "label", "log_x", "log_y"]
+    assert json.loads(printed(capsys, "describe", "PacketLoss", "--json"))["also"] == []
+
+
 def test_aspects_of_a_model_in_order(capsys: pytest.CaptureFixture[str]) -> None:
     options = (
         "--set",

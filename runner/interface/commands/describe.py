@@ -198,7 +198,7 @@ def _weaving(options: argparse.Namespace) -> int:
 
 
 def _describe_type(options: argparse.Namespace) -> int:
-    """The description of a type, of a class that stands in a parameter, or of a figure."""
+    """What has that name: an actor or aspect, or a class that stands in a parameter, and figures."""
     from dataclasses import asdict, replace
 
     from epicycle.actors import EpicycleError, did_you_mean
@@ -211,28 +211,36 @@ def _describe_type(options: argparse.Namespace) -> int:
 
     known, name = known_types(options), options.model
     types = {**known.actors, **known.aspects}
-    if name in types:
-        reference, parts = describe(name, types[name]), parts_described([types[name]])
-    else:
+    others: dict[str, Mapping[str, type[Configurable]]] = {}
+    if name not in types:
         loaded, _ = load_all(types)
-        others: dict[str, Mapping[str, type[Configurable]]]
         others = {base.__name__.lower(): found for base, found in parts_of(loaded.values()).items()}
-        others |= {"figure": figure_types(), "figure of studies": study_figure_types()}
-        kind = next((kind for kind, found in others.items() if name in found), None)
-        if kind is None:
-            variants = [each for found in others.values() for each in found]
-            near = did_you_mean(name, [*types, *packaged_models(), *variants])
-            raise EpicycleError(
-                f"there is no type or packaged model {name!r}{near}\n"
-                "   help: 'epicycle list models', 'epicycle list actors' and 'epicycle list aspects' list them\n"
-                "   help: for your own types, add '--types FILE.py'"
-            )
-        found = others[kind][name]
-        reference, parts = replace(describe(name, found), kind=kind), parts_described([found])
+    others |= {"figure": figure_types(), "figure of studies": study_figure_types()}
+    classes = [types[name]] if name in types else []
+    references = [describe(name, each) for each in classes]
+    for kind, found in others.items():
+        if name in found:
+            classes.append(found[name])
+            references.append(replace(describe(name, found[name]), kind=kind))
+    if not classes:
+        variants = [each for found in others.values() for each in found]
+        near = did_you_mean(name, [*types, *packaged_models(), *variants])
+        raise EpicycleError(
+            f"there is no type or packaged model {name!r}{near}\n"
+            "   help: 'epicycle list models', 'epicycle list actors' and 'epicycle list aspects' list them\n"
+            "   help: for your own types, add '--types FILE.py'"
+        )
     if options.json:
-        tell_json({**asdict(reference), "parts": {k: [asdict(each) for each in v] for k, v in parts.items()}}, indent=2)
-    else:
-        console().print(detail(reference, parts))
+        told = [
+            {**asdict(each), "parts": {base: [*map(asdict, known)] for base, known in parts_described([cls]).items()}}
+            for each, cls in zip(references, classes, strict=True)
+        ]
+        tell_json({**told[0], "also": told[1:]}, indent=2)
+        return DONE
+    for number, (reference, cls) in enumerate(zip(references, classes, strict=True)):
+        if number:
+            tell("")
+        console().print(detail(reference, parts_described([cls])))
     return DONE
 
 
