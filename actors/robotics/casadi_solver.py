@@ -6,6 +6,9 @@ each max(0, x) is a variable t with t >= 0 and t >= x.
 
 An infeasible problem is solved in two stages, as the barrier method does: the sum of the squared violations
 of the constraints is minimised first; then the cost, with each constraint bounded by its own least violation.
+
+A robot whose state is beyond its limits, after a disturbance or a gust, has no plan that keeps them: it then keeps to
+what braking makes of them.
 """
 
 from __future__ import annotations
@@ -57,6 +60,9 @@ def solve(problem: Problem, starts: Array, max_iterations: int = 500, method: st
     """Solve from ``starts[0]`` (k, N, m); never raises."""
     attempt = _Attempt(problem, starts.shape[1:], max_iterations, method)
     candidates = [start for start in starts if attempt.keeps_limits(start)]
+    if not candidates:
+        attempt.allow(starts[-1])
+        candidates = [start for start in starts[-1:] if attempt.keeps_limits(start)]
     start = candidates[0] if candidates else np.zeros(starts.shape[1:])
     controls = attempt.optimise(start, 0.0)
     if controls is None or attempt.worst(controls) > TOLERANCE:
@@ -94,6 +100,7 @@ class _Attempt:
         self.problem = _prepared(problem)
         self._parameters = np.concatenate([np.ravel(each) for each in self.problem.arrays])
         self._programs = _programs(self.problem, shape, max_iterations, method)
+        self._allowed = np.zeros(self._programs.limits)
         self.iterations = 0
 
     def violations(self, controls: Array) -> Array:
@@ -105,9 +112,14 @@ class _Attempt:
         """The largest violation, m."""
         return max(0.0, float(np.max(self.violations(controls), initial=0.0)))
 
+    def allow(self, braking: Array) -> None:
+        """Let plans break the limits as far as ``braking`` does."""
+        beyond = self.problem.limits(braking)
+        self._allowed = np.where(beyond > 0.0, beyond + _SLACK, 0.0)
+
     def keeps_limits(self, controls: Array) -> bool:
         """Whether the robot can do it."""
-        return bool((self.problem.limits(controls) <= 0.0).all())
+        return bool((self.problem.limits(controls) <= self._allowed).all())
 
     def optimise(self, start: Array, bounds: Any) -> Array | None:
         """Minimise the cost with the constraints at most ``bounds``; None without a usable result."""
@@ -121,7 +133,7 @@ class _Attempt:
     def _run(self, program: Any, start: Array, extra: Array, bounds: Any) -> Array | None:
         """Solve from the controls ``start`` and ``extra`` non-negative variables."""
         upper, limits = np.zeros(program.size1_out("g")), self._programs.limits
-        upper[:limits] = -_STRICT
+        upper[:limits] = self._allowed - _STRICT
         upper[limits : limits + self._programs.coupled] = bounds
         result = program(
             x0=np.concatenate([start.ravel(), extra]),

@@ -13,6 +13,7 @@ import pytest
 from epicycle.actors import (
     Barrier,
     BodyState,
+    Casadi,
     Dynamics,
     Estimate,
     ExtendedEstimator,
@@ -151,6 +152,25 @@ def test_the_car_from_the_command_line(folder: Path, capsys: pytest.CaptureFixtu
     assert main(["validate", "car.yaml", "--types", str(OWN / "car.py")]) == 0
     assert main(["describe", "Vehicle", "--types", str(OWN / "car.py")]) == 0
     assert "Bicycle" in capsys.readouterr().out
+
+
+def test_a_car_that_is_too_fast_brakes_and_still_steers(folder: Path) -> None:
+    """Beyond its limits it keeps no plan within them; it once went straight on for ever."""
+    pytest.importorskip("casadi")
+    (bicycle,) = types("car")
+    vehicle = Vehicle("v", dynamics=bicycle(heading=math.pi), start=[30, 0])
+    controller = RobustController("main.c", dynamics=bicycle(), objective=ReachGoal(goal=(30, 20)), solver=Casadi())
+    car, driver, control, speeds = Harness(vehicle), Harness(controller), np.zeros(2), []
+    for k in range(20):
+        car.fire(k / 10, trigger=k, acceleration=control)
+        if k == 1:
+            vehicle._state = [30.0, 0.0, math.pi, 12.0]  # a push, from outside
+        driver.fire(k / 10, trigger=k, state=car.last("state"))
+        control = driver.last("control")
+        speeds.append(float(car.last("state").rest[1]))
+    assert np.diff(speeds[3:12]) == pytest.approx(-0.39, abs=0.011)  # as hard as it can
+    assert max(speeds[16:]) <= 8.0
+    assert car.last("state").velocity[1] > 5.0  # towards the goal, which was to its right
 
 
 def test_a_solver_that_cannot_is_named(folder: Path) -> None:
