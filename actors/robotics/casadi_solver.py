@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core import EpicycleError
+from ..core import EpicycleError, brief
 from .arrays import Array
 from .numerics.horizon import TOLERANCE, Solution
 from .problem import FAR, Problem
@@ -39,8 +39,14 @@ _OPTIONS: dict[str, dict[str, Any]] = {
 }
 
 
+_WRITTEN_FOR_BOTH = (
+    "take functions of a state, a control or a trajectory from epicycle.actors.symbolic, not from math, and write no "
+    "condition on them"
+)
+
+
 class SolverError(EpicycleError):
-    """A solver is not installed."""
+    """A solver is not installed, or cannot use what it is given."""
 
 
 def load_casadi(plugin: str = "ipopt") -> Any:
@@ -172,6 +178,13 @@ def _programs(problem: Problem, shape: tuple[int, ...], max_iterations: int, met
     return _made[key]
 
 
+def _has_nan(cs: Any, made: Any) -> bool:
+    """Whether symbols were lost on the way: the functions of ``math`` make NaN of them."""
+    function = cs.Function("made", [cs.vertcat(*cs.symvar(made))], [made])
+    steps = range(function.n_instructions())
+    return any(math.isnan(function.instruction_constant(k)) for k in steps if function.instruction_id(k) == cs.OP_CONST)
+
+
 def _new_programs(problem: Problem, shape: tuple[int, ...], max_iterations: int, method: str) -> _Programs:
     cs = load_casadi(method)
     found: list[Any] = []  # what positive parts are of, and these
@@ -190,16 +203,29 @@ def _new_programs(problem: Problem, shape: tuple[int, ...], max_iterations: int,
     numbers = [symbols(*(np.shape(each) or (1,))) for each in problem.arrays]
     posed, controls = problem.of(numbers), symbols(*shape)
     parameters = cs.vertcat(*[each for array in numbers for each in array.ravel()])
-    limits, coupled = posed.limits(controls).ravel(), posed.constraints(controls)
-    cost = posed.cost(controls, positive)
+    try:
+        limits, coupled = posed.limits(controls).ravel(), posed.constraints(controls)
+        cost = posed.cost(controls, positive)
+    except RuntimeError as error:
+        if "truth value" not in str(error):
+            raise
+        told = SolverError(f"a symbol is compared here: {_WRITTEN_FOR_BOTH}")
+        raise told.with_traceback(error.__traceback__) from None
     within = [each for values, _ in found for each in values]
     parts = [each for _, made in found for each in np.ravel(made)]
+    try:
+        cost = cs.SX(cost)
+    except NotImplementedError:
+        raise SolverError(f"{type(problem.objective).__name__}.cost gave {brief(cost)}; expected a number") from None
+    for part, made in ((problem.dynamics, [*limits, *coupled]), (problem.objective, [cost, *within])):
+        if _has_nan(cs, cs.vertcat(*made)):
+            raise SolverError(f"{type(part).__name__} gave NaN for symbols: {_WRITTEN_FOR_BOTH}")
 
     def program(cost: Any, extra: list[Any], rows: list[Any]) -> Any:
         posed = {
             "x": cs.vertcat(*controls.ravel(), *extra),
             "p": parameters,
-            "f": cs.SX(cost),
+            "f": cost,
             "g": cs.vertcat(*limits, *rows),
         }
         return cs.nlpsol("program", method, posed, options)

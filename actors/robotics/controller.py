@@ -192,6 +192,7 @@ class RobustController(TargetModel, Actor):
             climb_acceleration=self.climb_acceleration,
         )
         d = self._motion.dimensions
+        self._motion.try_out([0.0] * d if self.start is None else self.start.tolist())
         for objective in (self.objective, *self.objectives.values()):
             if reason := self.solver.refuses(self._motion, objective):
                 raise ParameterError(f"solver: {reason}")

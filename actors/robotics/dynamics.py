@@ -12,6 +12,7 @@ from ..core import Configurable, Parameter
 from ..core.elementary import hypot
 from .arrays import Array, array_of, floats
 from .messages import BodyState, MotionState
+from .own import numbers_of
 from .receiving import MessageError
 
 Numbers: TypeAlias = Any  # a sequence or an array of floats or of symbols
@@ -33,7 +34,7 @@ class Dynamics(Configurable):
 
     def step(self, state: Numbers, control: Numbers, period: float) -> Numbers:
         """The state after a ``period`` (s) of a constant control."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no step()")
 
     def velocity(self, state: Numbers) -> Numbers:
         """The velocity (d,), m/s."""
@@ -78,6 +79,18 @@ class Dynamics(Configurable):
         """The token for a state."""
         d = self.dimensions
         return MotionState(np.array(state[:d]), np.array(self.velocity(state)), time, np.array(state[d:]))
+
+    def try_out(self, place: Sequence[float]) -> None:
+        """Raise ``MethodError`` if a method does not give as many numbers as it should."""
+        of_state, of_control = ", as 'states' says", ", as 'controls' says"
+        state = numbers_of(self, "at_rest", self.at_rest(place), self.states, of_state)
+        numbers_of(self, "velocity", self.velocity(state), self.dimensions, ", as 'dimensions' says")
+        control = numbers_of(self, "braking", self.braking(state, 1.0), self.controls, of_control)
+        numbers_of(self, "step", self.step(state, control, 1.0), self.states, of_state)
+        numbers_of(self, "state_limits", self.state_limits(state))
+        numbers_of(self, "control_limits", self.control_limits(control))
+        numbers_of(self, "limited_state", self.limited_state(state), self.states, of_state)
+        numbers_of(self, "limited_control", self.limited_control(control), self.controls, of_control)
 
     def trajectory(self, state: Numbers, controls: Any, period: float) -> Any:
         """States (N, n) at steps 1..N, from the first one, under controls (N, m); the last control changes none."""
@@ -135,6 +148,9 @@ class DoubleIntegrator(Dynamics):
 
     def check(self) -> None:
         self.states, self.controls = 2 * self.dimensions, self.dimensions
+
+    def try_out(self, place: Sequence[float]) -> None:
+        """It is right, and its formulas take long to load."""
 
     def step(self, state: Numbers, control: Numbers, period: float) -> Numbers:
         from .numerics.definitions import dynamics

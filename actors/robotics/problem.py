@@ -56,7 +56,7 @@ class Objective(Configurable):
 
     def cost(self, trajectory: Trajectory, beliefs: Beliefs) -> Any:
         """The number that a plan should make small."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no cost()")
 
     def check_dimensions(self, dimensions: int) -> None:
         """Raise ``ParameterError`` if it is not for a robot with so many dimensions."""

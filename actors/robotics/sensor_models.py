@@ -23,11 +23,11 @@ class SensorModel(Configurable):
 
     def h(self, target: Sequence[float], observer: Sequence[float]) -> Sequence[float]:
         """The k numbers that a sensor without noise measures."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no h()")
 
     def noise(self, target: Sequence[float], observer: Sequence[float]) -> Rows:
         """R, the covariance (k, k) of their errors."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no noise()")
 
     def difference(self, one: Sequence[float], other: Sequence[float]) -> Sequence[float]:
         """One measurement minus another one; angles need their own."""

@@ -23,6 +23,7 @@ from ..core.elementary import cos, hypot, sin
 from .arrays import all_finite, floats
 from .dynamics import DoubleIntegrator, Dynamics
 from .messages import BodyState, Measurement, Observation, Plan, enclosing, state_of
+from .own import covariance_of, numbers_of
 from .receiving import PlaceParameter, latest
 from .sensor_models import RANGE, RELATIVE_POSITION, SensorModel, root_of
 from .sight import disturbed, is_hidden
@@ -71,6 +72,7 @@ class Vehicle(Actor):
         name, d = type(self._motion).__name__, self._motion.dimensions
         if d != count:
             raise ParameterError(f"start: it has {count} numbers; expected {d} for a {name}")
+        self._motion.try_out(floats(self.start))
         if self.start_velocity is not None and not isinstance(self._motion, DoubleIntegrator):
             raise ParameterError(f"start_velocity: a {name} starts as its parameters say; leave it out")
         self.acceleration.change("type", shaped(np.ndarray, (self._motion.controls,)))
@@ -216,8 +218,8 @@ class Sensor(Actor):
         model: Any = self.model
         body = latest(self.target)
         target, observer = [*floats(body.position), *floats(body.velocity)], state_of(robot)
-        value = list(map(float, model.h(target, observer)))
-        root = root_of(model.noise(target, observer))
+        value = numbers_of(model, "h", model.h(target, observer))
+        root = root_of(covariance_of(model, "noise", model.noise(target, observer), len(value)))
         drawn = [self._draw_of_model() for _ in value]
         for i, row in enumerate(root):
             for k in range(i + 1):
