@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,18 @@ NONLINEAR = ("ExtendedKalmanFilter", "UnscentedKalmanFilter", "CubatureKalmanFil
 
 class FilterError(EpicycleError):
     """A filter cannot use the measurements it got."""
+
+
+class _BeyondError(Exception):
+    """FilterPy cannot compute with such numbers."""
+
+
+def _by_filterpy(function: Callable[..., Any], *given: Any, **named: Any) -> Any:
+    """What FilterPy makes of numbers that may be huge; raises ``_BeyondError`` where NumPy or SciPy raise."""
+    try:
+        return function(*given, **named)
+    except ValueError as error:  # a LinAlgError, too
+        raise _BeyondError from error
 
 
 class FilterPyEstimator(KalmanEstimator):
@@ -41,40 +54,60 @@ class FilterPyEstimator(KalmanEstimator):
         self._at: State | None = None  # its state
 
     def step(self, state: State, elapsed: float, measurements: list[Measurement]) -> tuple[State, bool]:
-        if state is not self._at:
-            self._filter.x, self._filter.P = map(np.array, state)
-        if elapsed > 0.0:
-            self._move(elapsed)
-        fused = bool(measurements) and self._update(measurements)
-        self._at = np.array(self._filter.x), np.array(self._filter.P)
+        try:
+            if state is not self._at:
+                self._take(state)
+            if elapsed > 0.0:
+                self._move(elapsed)
+            fused = bool(measurements) and self._update(measurements)
+            self._at = self._state()
+        except _BeyondError:
+            # As the compiled filter predicts, and without the measurements.
+            mean, covariance = self._predict(*self._told(state), *self._model(elapsed))
+            self._at, fused = None, False
+            return (mean.reshape(state[0].shape), covariance), fused
         return self._at, fused
 
     def prior(self) -> State:
         mean, covariance = super().prior()
         return mean.reshape(4, 1) if self.filter == "CubatureKalmanFilter" else mean, covariance  # which needs columns
 
+    def _take(self, state: State) -> None:
+        for name, value in zip("xP", state, strict=True):
+            _by_filterpy(setattr, self._filter, name, np.array(value))
+
+    def _state(self) -> State:
+        """That of the filter; raises ``_BeyondError`` if it is not finite."""
+        state = np.array(self._filter.x), np.array(self._filter.P)
+        if not all(np.isfinite(each).all() for each in state):
+            raise _BeyondError
+        return state
+
     def _move(self, elapsed: float) -> None:
         from .numerics.ukf import constant_velocity
 
-        self._filter.Q = self._noise_over(elapsed)
+        _by_filterpy(setattr, self._filter, "Q", self._noise_over(elapsed))
         if self.filter in ("UnscentedKalmanFilter", "CubatureKalmanFilter"):
-            self._filter.predict(dt=elapsed)
+            _by_filterpy(self._filter.predict, dt=elapsed)
         else:
             self._filter.F = constant_velocity(elapsed)
-            self._filter.predict()
+            _by_filterpy(self._filter.predict)
 
     def _update(self, measurements: list[Measurement]) -> bool:
-        before = np.array(self._filter.x), np.array(self._filter.P)
+        """Fuse the measurements; whether that was possible."""
+        before = self._state()
         mean, covariance = self._told(before)
         points, weights = self._sigma_points(mean, covariance, self.kappa)
         # All as seen from the prediction, independent of the order of fusion.
         noises = [self._noise_of(each, mean, points, weights) for each in measurements]
-        for each, noise in zip(measurements, noises, strict=True):
-            self._fuse(each, noise)
-        if np.isfinite(self._filter.x).all() and np.isfinite(self._filter.P).all():
-            return True
-        self._filter.x, self._filter.P = before
-        return False
+        try:
+            for each, noise in zip(measurements, noises, strict=True):
+                self._fuse(each, noise)
+            self._state()
+        except _BeyondError:
+            self._take(before)
+            return False
+        return True
 
     def _fuse(self, measurement: Measurement, noise: Array) -> None:
         used = self._filter
@@ -87,9 +120,8 @@ class FilterPyEstimator(KalmanEstimator):
                 )
             position, noise = (measurement.value + measurement.observer)[:2], noise[:2, :2]
             if self.filter == "SquareRootKalmanFilter":
-                used.update(position, np.linalg.cholesky(noise))
-            else:
-                used.update(position, R=noise)
+                noise = _by_filterpy(np.linalg.cholesky, noise)
+            _by_filterpy(used.update, position, noise)
             return
         # Differences to what is measured at the mean, so that angles near a half turn do no harm.
         mean = floats(np.ravel(used.x))
@@ -98,25 +130,29 @@ class FilterPyEstimator(KalmanEstimator):
         def observe(state: Array) -> Array:
             return np.array(measurement.sensor.difference(measurement.expected(floats(state)), there), dtype=float)
 
+        # A sensor's own errors are not FilterPy's: it is asked before.
         if self.filter == "ExtendedKalmanFilter":
-            used.update(error, lambda state: np.transpose(slopes(measurement, floats(state))), observe, R=noise)
+            slope, seen = np.transpose(slopes(measurement, mean)), observe(np.array(mean))
+            _by_filterpy(used.update, error, lambda state: slope, lambda state: seen, R=noise)
         elif self.filter == "UnscentedKalmanFilter":
             # Its points stay where the prediction left them; a second update needs them around the first
             # one's result.
-            used.sigmas_f = used.points_fn.sigma_points(used.x, used.P)
-            used.update(error, R=noise, hx=observe)
+            used.sigmas_f = _by_filterpy(used.points_fn.sigma_points, used.x, used.P)
+            images = iter([observe(each) for each in used.sigmas_f])
+            _by_filterpy(used.update, error, R=noise, hx=lambda state: next(images))
         else:
             # It keeps the propagated points, which hold no process noise; draw them from the prediction
             # instead.
             from filterpy.kalman import spherical_radial_sigmas
 
-            used.sigmas_f = spherical_radial_sigmas(used.x, used.P)
+            used.sigmas_f = _by_filterpy(spherical_radial_sigmas, used.x, used.P)
             used.sigmas_h = np.zeros((len(used.sigmas_f), len(error)))
-            used.hx = observe
-            used.update(error[:, np.newaxis], R=noise)
+            images = iter([observe(each) for each in used.sigmas_f])
+            used.hx = lambda state: next(images)
+            _by_filterpy(used.update, error[:, np.newaxis], R=noise)
 
     def _told(self, state: State) -> State:
-        return np.array(state[0]).ravel(), 0.5 * (state[1] + state[1].T)
+        return np.array(state[0]).ravel(), 0.5 * state[1] + 0.5 * state[1].T
 
     def estimate_of(self, state: State, time: float, sources: tuple[str, ...]) -> Estimate:
         return Estimate(*self._told(state), time, sources)

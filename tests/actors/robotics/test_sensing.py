@@ -16,7 +16,9 @@ from epicycle.actors import (
     FilterError,
     FilterPyEstimator,
     Measurement,
+    Observation,
     Sensor,
+    SensorModel,
     UnscentedEstimator,
 )
 from epicycle.actors.testing import Harness
@@ -328,6 +330,40 @@ def test_estimator_never_sends_what_is_not_finite(make: type, bad: float) -> Non
         assert harness.last("estimate").finite
     if not np.isfinite(bad):
         assert [each.sources for each in harness.tokens("estimate")] == [("a",), (), (), (), ("a",)]
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # NumPy's, of what is beyond a float
+@pytest.mark.parametrize("filter_name", FILTERS)
+@pytest.mark.parametrize("huge", [1e100, 1e155, 1e160, 1e308])
+@pytest.mark.parametrize("where", ["value", "observer", "prior_mean", "prior_variance"])
+def test_filterpy_does_not_end_a_run_for_huge_numbers(filter_name: str, huge: float, where: str) -> None:
+    """NumPy and SciPy raise where a covariance is not finite, or is no longer one for its rounding."""
+    given = {where: [huge] * 4} if where.startswith("prior") else {}
+    harness = Harness(FilterPyEstimator("e", filter=filter_name, **given))
+    for step in range(5):
+        told = {"value": np.array([12.0, 2.0]), "observer": np.zeros(2)}
+        if step == 2 and where in told:
+            told[where] = np.array([huge, -huge])
+        seen = Measurement("a", told["observer"], "relative_position", told["value"], 0.2, 2.0, step / 10)
+        harness.fire(step / 10, trigger=step, measurements=[seen])
+        assert harness.last("estimate").finite
+
+
+@pytest.mark.parametrize("filter_name", FILTERS[2:])
+def test_an_error_of_a_sensor_is_not_taken_for_one_of_filterpy(filter_name: str) -> None:
+    class Broken(SensorModel):
+        """Knows no place."""
+
+        def h(self, target: object, observer: object) -> object:
+            raise ValueError("no such place")
+
+        def noise(self, target: object, observer: object) -> object:
+            return [[1.0]]
+
+    harness = Harness(FilterPyEstimator("e", filter=filter_name))
+    seen = Observation("a", np.zeros(2), "Broken", np.zeros(1), 0.0, 0.0, 0.0, Broken(), np.zeros(4))
+    with pytest.raises(ValueError, match=r"^no such place$"):
+        harness.fire(0.0, trigger=0, measurements=[seen])
 
 
 @pytest.mark.parametrize("filter_name", FILTERS)
