@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from math import prod
@@ -193,7 +194,7 @@ class QuestionReader(NodeReader):
         if not isinstance(node, Scalar):
             return self.selection(node, what, "than")
         value = node.value
-        if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= sys.float_info.max:
             return float(value)
         message = f"{what}: 'than' is neither a finite number nor a mapping from factors to levels"
         hint = "write a number without a unit, which is that of the metric, or levels such as {load: [0.5, 0.7]}"
