@@ -14,7 +14,7 @@ from epicycle.actors import EpicycleError, counted, did_you_mean
 
 from ..execution.engine import ActorError, LoopError, Simulation
 from ..model.build.model import Model
-from ..study.inference import Estimate, average, holm, paired_difference, with_interval
+from ..study.inference import Estimate, average, holm, is_usable, paired_difference, with_interval
 from ..study.run.processes import Worker
 from ..support.tables import Table, pandas_module
 from .answer import Answer
@@ -79,11 +79,11 @@ class Comparison(Answer):
         return [name for name in self.units if all(self.values(each, name) for each in self.runs)]
 
     def values(self, variant: str, metric: str) -> dict[int, float]:
-        """The values of a metric by seed, where it has a number."""
+        """The values of a metric by seed, where it has one of which statistics can be made."""
         if metric not in self.units:
             raise EpicycleError(f"{self.model} has no metric {metric!r}{did_you_mean(metric, list(self.units))}")
         found = {seed: results.metrics.get(metric) for seed, results in self.runs[variant].items()}
-        return {seed: float(each) for seed, each in found.items() if isinstance(each, (int, float))}
+        return {seed: float(each) for seed, each in found.items() if isinstance(each, (int, float)) and is_usable(each)}
 
     def _average(self, variant: str, metric: str) -> Estimate:
         found = [results.metrics.get(metric) for results in self.runs[variant].values()]

@@ -18,7 +18,7 @@ from ..model.language.study import is_study, read_study
 from ..model.text.document import parse, plain
 from ..model.text.files import COMMAND_LINE
 from ..model.text.problems import Position, Problems
-from ..study.inference import Estimate, mean, with_interval
+from ..study.inference import Estimate, is_usable, mean, with_interval
 from ..study.judge.samples import value_in
 from ..study.plan.plan import Plan
 from ..study.run.backlog import OK
@@ -287,10 +287,10 @@ class _Optimising:
         missing = 0
         for row in rows:
             number = _value(self._objective, row)
-            if number is None or not math.isfinite(number):
-                missing += 1
-            else:
+            if is_usable(number):
                 by_replication.setdefault(row["replication"], []).append(number)
+            else:
+                missing += 1
         means = [mean(each).value for each in by_replication.values()]
         broken = {
             text: len([row for row in rows if not _value(formula, row)]) for text, formula in self._conditions.items()

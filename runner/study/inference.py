@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
 from epicycle.actors import normal_quantile, random_stream
 
@@ -21,6 +21,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 LEVEL = 0.95
+
+
+def is_usable(value: float | None) -> TypeGuard[float]:
+    """Whether statistics can be made of a value: it is a number, and the squares of many such numbers are finite."""
+    return value is not None and abs(value) < 1e150
 
 
 @dataclass(frozen=True)

@@ -200,8 +200,8 @@ def _parameter(reader: NodeReader, name: str, entry: Entry) -> ParameterText:
     literal = found.value.value if isinstance(found.value, Scalar) else None
     other = "'choices'" if "choices" in entries else "true or false" if isinstance(literal, bool) else ""
     for key in (each for each in ("unit", *BOUNDS) if other and each in entries):
-        message, at = f"{what}: {key!r} cannot be used with {other}", entries[key].key.position
-        said[key] = reader.problems.add(message, at, f"leave {key!r} out")
+        message, place = f"{what}: {key!r} cannot be used with {other}", entries[key].key.position
+        said[key] = reader.problems.add(message, place, f"leave {key!r} out")
     if POISON in said.values():
         return replace(found, value=POISON)
     if found.unit or not {type(found.min), type(found.above), type(found.max)} & {str}:  # otherwise it may be inherited

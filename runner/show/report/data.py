@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import groupby
@@ -12,7 +11,7 @@ from typing import Any
 from epicycle.actors import abridged, visible
 
 from ...model.language.dimensions import Factor
-from ...study.inference import Estimate, average
+from ...study.inference import Estimate, average, is_usable
 from ...study.judge.study_results import StudyResults
 from ...study.plan.columns import Column
 from ...study.plan.plan import Plan
@@ -39,7 +38,7 @@ class Condition:
     def numbers(self, metric: str) -> list[float]:
         """The values of a metric; runs that failed or have none are left out."""
         values = (row[metric] for row in self.good)
-        return [value for value in values if value is not None and math.isfinite(value)]
+        return [value for value in values if is_usable(value)]
 
 
 class Data:

@@ -15,7 +15,7 @@ from ...model.language.claims import Selection
 from ...model.language.dimensions import Factor
 from ...model.language.study import Study
 from ...model.language.study_metric import asks_for_none
-from ..inference import LEVEL, Estimate, average
+from ..inference import LEVEL, Estimate, average, is_usable
 from ..plan.plan import index_of
 from ..run.backlog import OK
 
@@ -95,10 +95,10 @@ class Samples:
         return self.runs.get(condition, {})
 
     def numbers(self, condition: int, metric: str) -> dict[int, float]:
-        """The finite numbers of a metric by replication."""
+        """The numbers of a metric of which statistics can be made, by replication."""
         column = self._column(metric)
         values = {one: None if row is None else column[row] for one, row in self.over(condition).items()}
-        return {one: value for one, value in values.items() if value is not None and math.isfinite(value)}
+        return {one: value for one, value in values.items() if is_usable(value)}
 
     def average(self, condition: int, metric: str, level: float = LEVEL) -> Estimate:
         """The mean of a metric with its interval; of one that is true or false, a share."""

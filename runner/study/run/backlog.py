@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 
-from ..inference import half_width
+from ..inference import half_width, is_usable
 from ..plan.plan import Condition, Plan
 from .share import ALL, Share
 
@@ -137,5 +136,5 @@ class Backlog:
 
     def _note(self, condition: int, done: Done, counts: Counter[str]) -> None:
         counts[done.status] += 1
-        if done.status == OK and done.value is not None and math.isfinite(done.value):
+        if done.status == OK and is_usable(done.value):
             self._values[condition].append(done.value)
