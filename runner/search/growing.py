@@ -123,7 +123,7 @@ class Growing:
         self._batches += 1
         distinct = {_place_of(level): level for level in levels}
         plan, order = self._plan(list(distinct.values())), list(distinct)
-        sent, others = replace(plan, texts={}, files=()), plan.conditions // len(order)
+        sent, others = replace(plan, texts={}), plan.conditions // len(order)
         keys, tasks = list[list[str]](), dict[str, Task]()
         for at, level in enumerate(levels):
             first = order.index(_place_of(level)) * others

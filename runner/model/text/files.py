@@ -88,6 +88,14 @@ def note_file(path: Path, data: bytes) -> None:
         noted.files[str(path)] = hashlib.sha256(data).hexdigest()
 
 
+def digest_of(name: str) -> str:
+    """The SHA-256 of a file, as it is noted; empty if it cannot be read."""
+    try:
+        return hashlib.sha256(read_regular(name)).hexdigest()
+    except OSError:
+        return ""
+
+
 def note_package(name: str, version: str) -> None:
     if (noted := _noted.get()) is not None:
         noted.packages[name] = version

@@ -83,7 +83,7 @@ class Plan:
     texts: dict[str, str]  # the YAML of the model and of everything that belongs to it
     columns: dict[str, Column]
     made_with: str  # the version of Epicycle
-    files: Iterable[str] = ()  # all files read, by the names used to read them
+    files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 of all that was read, by the names used for that
     search: Search | None = None  # what chose the conditions, if they were not known from the start
     denied: str = ""  # why the code of its types must not be run
 
@@ -392,7 +392,7 @@ class _Read:
 
     models: list[Model] = field(default_factory=list)
     texts: dict[str, str] = field(default_factory=dict)
-    files: dict[str, None] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
 
 
 def _tried(study: Study, place: list[int], read: _Read, problems: Problems) -> Sources:
@@ -409,7 +409,7 @@ def _tried(study: Study, place: list[int], read: _Read, problems: Problems) -> S
         *noted.files.items(),
         *code_of(study.types).items(),
     ]:
-        read.files[name] = None
+        read.files[name] = digest
         path = Path(name).resolve()
         # By names that stay the same when the study with its model, or Epicycle, is moved.
         shown = path.relative_to(home).as_posix() if path.is_relative_to(home) else path.name

@@ -71,7 +71,7 @@ def recording(store: Store, backlog: Backlog, timeout: float | None) -> Iterator
 
 def make_here(recorder: Recorder, jobs: int, tell: Callable[[], None]) -> None:
     """Make the runs in processes on this machine."""
-    with Processes(Runner.of_manifest, recorder.store.manifest) as processes:
+    with Processes(Runner.of_manifest, recorder.store.manifest, recorder.backlog.plan.files) as processes:
         make_in(processes, recorder, jobs, tell)
 
 

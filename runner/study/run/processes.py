@@ -6,7 +6,7 @@ This process survives runs that hang or kill their process, and can end them.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from ...support.apart import DONE, LATE, Outcome, Process, UnwantedError, WorkerError, always
@@ -23,6 +23,16 @@ class Worker(Protocol):
 
     def make(self, request: Any) -> Any:
         """The result, as plain data."""
+
+
+def check_same(before: Mapping[str, str], now: Mapping[str, str]) -> None:
+    """Raise ``WorkerError`` if a file is not as it was read before, so that a run would be that of another model."""
+    if changed := sorted(name for name, digest in now.items() if before.get(name, digest) != digest):
+        raise WorkerError(
+            f"{', '.join(changed)} changed while runs were made, and the next ones would be of another model\n"
+            "   help: finished runs are kept; undo the change and repeat the command to continue them, or repeat it "
+            "with the change to make all runs anew"
+        )
 
 
 class Processes:

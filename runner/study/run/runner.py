@@ -5,20 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from types import MappingProxyType
 from typing import Any, Protocol
 
 from epicycle.actors import EpicycleError, readable
 
 from ...execution.engine import Results, Simulation
 from ...model.build.model import Model
+from ...model.catalogue.code import code_of
+from ...model.text.files import digest_of, noting
 from ...support.apart import DONE
 from ..plan.columns import value_of
 from ..plan.plan import Condition, Plan
 from .backlog import FAILED, OK, Task
 from .manifest import columns_of_rows
-from .processes import Processes
+from .processes import Processes, check_same
 from .store import Row
 
 _MODELS_KEPT = 4
@@ -32,12 +35,12 @@ class Runner:
         self._loaded = lru_cache(_MODELS_KEPT)(self._load)
 
     @classmethod
-    def of_manifest(cls, manifest: Mapping[str, Any]) -> Runner:
-        """That of a results folder."""
-        return cls(Plan.of_manifest(manifest).allowed())
+    def of_manifest(cls, manifest: Mapping[str, Any], files: Mapping[str, str] = MappingProxyType({})) -> Runner:
+        """That of a results folder, for which these ``files`` were read."""
+        return cls(replace(Plan.of_manifest(manifest).allowed(), files=files))
 
     def prepare(self, task: Task) -> None:
-        """Load the model of the task's condition, unless it is loaded."""
+        """Load the model of the task's condition, unless it is loaded; raises ``WorkerError`` if it has changed."""
         self._loaded(task.condition)
 
     def why_not(self, task: Task) -> str | None:
@@ -63,16 +66,24 @@ class Runner:
         return row
 
     def _load(self, index: int) -> tuple[Condition, Model | str]:
-        condition = self.plan.condition(index)
-        try:
-            model = self.plan.load(condition)
-        except EpicycleError as error:
-            return condition, str(error)
+        condition, files = self.plan.condition(index), self.plan.files
+        with noting() as noted:
+            try:
+                model = self.plan.load(condition)
+            except EpicycleError as error:
+                check_same(files, {name: digest_of(name) for name in files})  # it may have failed before it read them
+                return condition, str(error)
+        check_same(files, {**noted.files, **self._code})
         # Recording costs time and memory, and most studies need none of it.
         wanted = {signal for metric in self.plan.metrics for signal in metric.signals}
         model.output.recorded = [name for name in model.output.recorded if name in wanted]
         self._watch_only_what_counts(model)
         return condition, model
+
+    @cached_property
+    def _code(self) -> dict[str, str]:
+        """The code of types as it is when the first model is loaded, which is the one that runs."""
+        return code_of(self.plan.study.types) if self.plan.files else {}
 
     def _watch_only_what_counts(self, model: Model) -> None:
         """Leave out monitors of which nobody asks for the verdict, and which end no run."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 from statistics import mean
 from typing import Any
@@ -15,9 +16,12 @@ from scipy import stats
 
 from epicycle.runner import Simulation, load_model, open_study
 from epicycle.runner.interface.cli import main
+from epicycle.runner.model.language.study import read_study
+from epicycle.runner.study.plan.plan import Plan
 from epicycle.runner.study.session import run_study
+from epicycle.runner.support.apart import WorkerError
 from tests.study.study_commands import study
-from tests.study.study_parts import STUDY, THIS, plan_of, write
+from tests.study.study_parts import MODEL, STUDY, THIS, plan_of, write
 
 
 def test_rows_are_what_single_runs_give(done: Path) -> None:
@@ -54,6 +58,35 @@ def test_paired_conditions_have_common_random_numbers(paired: bool, tmp_path: Pa
         more = plan_of(write(tmp_path / "more", STUDY.replace("[0 m/s,", "[5 m/s, 0 m/s,") + "paired: false\n"))
         seeds = [more.seed(more.condition(1), each) for each in range(5)]
         assert seeds == [row["seed"] for row in first]
+
+
+@pytest.mark.parametrize("text", [MODEL.replace("factor: 2", "factor: 3"), "model: [", None])
+def test_runs_of_a_model_that_has_changed_since_are_not_made(text: str | None, tmp_path: Path) -> None:
+    """They would stand in the table as those of the model that was checked."""
+    plan, model = plan_of(write(tmp_path)), tmp_path / "walk.yaml"
+    if text is None:
+        model.unlink()
+    else:
+        model.write_text(text, encoding="utf-8")
+    with pytest.raises(WorkerError) as error:
+        run_study(plan, tmp_path / "out", jobs=1)
+    assert str(error.value) == (
+        f"{model} changed while runs were made, and the next ones would be of another model\n"
+        "   help: finished runs are kept; undo the change and repeat the command to continue them, or repeat it with "
+        "the change to make all runs anew"
+    )
+    assert open_study(tmp_path / "out").counts() == {}
+    write(tmp_path)
+    assert run_study(plan, tmp_path / "out", jobs=1).made == 10
+
+
+def test_runs_are_not_made_with_types_that_have_changed_since(tmp_path: Path) -> None:
+    types = tmp_path / "walking.py"
+    types.write_text(THIS.read_text(encoding="utf-8"), encoding="utf-8")
+    plan = Plan.made(read_study(write(tmp_path), types=[types]))
+    types.write_text(THIS.read_text(encoding="utf-8").replace("range(10)", "range(9)"), encoding="utf-8")
+    with pytest.raises(WorkerError, match=rf"^{re.escape(str(types))} changed while runs were made, and the next"):
+        run_study(plan, tmp_path / "out", jobs=1)
 
 
 def test_table_is_the_same_for_any_number_of_jobs(done: Path, tmp_path: Path) -> None:
