@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
@@ -20,13 +20,13 @@ from ..model.language.dimensions import number_node
 from ..model.language.settings import Setting
 from ..model.text.files import COMMAND_LINE
 from ..model.text.problems import ModelError, Position
-from ..study.run.processes import Worker
+from ..study.run.processes import Worker, check_same
 from ..study.session import available_cores
 from ..support.bars import Show, unseen
 from ..support.student import student_quantile
 from .cache import NUMBER, EvaluationCache
 from .calibration import Calibration, Fitted, Matched
-from .evaluator import Evaluator
+from .evaluator import Evaluator, files_of
 from .proposals import SPREAD, Point, spread
 from .space import Interval, SearchSpec, read_space
 from .spec import Match, results_folder
@@ -58,7 +58,7 @@ def calibrate(
     task = _Task(spec, goal)
     folder = out or results_folder(task.model.name, "calibration")
     cache = EvaluationCache(task.model, task.about(), [NUMBER], folder)
-    with Evaluator(task, jobs or available_cores(), _Task, spec, goal) as evaluator:
+    with Evaluator(task, jobs or available_cores(), _Task, spec, goal, task.read) as evaluator:
         found = _fitted(_Runs(task, evaluator, cache, show))
     found.folder = folder
     return found
@@ -161,9 +161,11 @@ def _around(shares: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], NDAr
 class _Task(Worker):
     """What is fitted to what, read once; makes runs with given parameters."""
 
-    def __init__(self, spec: SearchSpec, goal: Match) -> None:
+    def __init__(self, spec: SearchSpec, goal: Match, read: Mapping[str, str] | None = None) -> None:
+        """``read`` are the files that were read before for the model."""
         self.spec, self.linear = spec, goal.between == "linear"
         self.model = spec.load()
+        self.read = files_of(self.model) if read is None else read
         space = read_space(spec, self.model)
         self.axes = [axis for axis in space.axes if isinstance(axis, Interval) and axis.kind == "float"]
         if wrong := [axis.path for axis in space.axes if axis not in self.axes]:
@@ -214,9 +216,11 @@ class _Task(Worker):
         """What the model sends at the times of all measured values."""
         key = self.key(point)
         try:
-            results = self.results(self.spec.load(self.settings(point)))
+            model = self.spec.load(self.settings(point))
+            results = self.results(model)
         except EpicycleError as error:
             raise EpicycleError(f"{key}: {error}") from error
+        check_same(self.read, files_of(model))
         return [
             value
             for signal, times, _ in self.signals

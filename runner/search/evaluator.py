@@ -15,7 +15,7 @@ from typing import Any
 from epicycle.actors import EpicycleError
 
 from ..model.build.model import Model
-from ..study.run.processes import Processes, Worker
+from ..study.run.processes import Processes, Worker, check_same
 from ..study.run_spec import RunSpec, opened, spec_of
 from ..study.session import available_cores
 from ..support.apart import DONE, Outcome, WorkerError
@@ -130,21 +130,32 @@ def _worker_of(recipe: Recipe, kind: Callable[..., Worker], *others: object) -> 
 
 @dataclass(frozen=True)
 class Recipe:
-    """How another process makes the same model: as it was named, with the monitors that it has now."""
+    """How another process makes the same model: as it was named, with the monitors that it has now.
+
+    ``files`` are those that were read for it, by their SHA-256.
+    """
 
     spec: RunSpec
     monitors: Mapping[str, str]
+    files: Mapping[str, str]
 
     @classmethod
     def of(cls, model: Model) -> Recipe | None:
         """That of a model; None for one that only this program knows."""
         if (spec := spec_of(model, None, None)) is None:
             return None
-        return cls(spec, {each.name: each.requirement.property for each in model.output.monitors})
+        return cls(spec, {each.name: each.requirement.property for each in model.output.monitors}, files_of(model))
 
     def model(self) -> Model:
-        """The model."""
-        return with_monitors(opened(self.spec).model, self.monitors)
+        """The model; raises ``WorkerError`` if its files have changed."""
+        model = opened(self.spec).model
+        check_same(self.files, files_of(model))
+        return with_monitors(model, self.monitors)
+
+
+def files_of(model: Model) -> Mapping[str, str]:
+    """The files that were read for a model, by their SHA-256."""
+    return {} if model.origin is None else model.origin.noted.files
 
 
 def jobs_for(model: Model, jobs: int | None, what: str = "") -> int:

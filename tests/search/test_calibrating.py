@@ -12,7 +12,9 @@ import pytest
 
 import epicycle
 from epicycle.actors import EpicycleError, random_stream
+from epicycle.runner.execution.engine import Simulation
 from epicycle.runner.interface.cli import main
+from epicycle.runner.support.apart import WorkerError
 
 OSCILLATOR = """
 model: oscillator
@@ -44,6 +46,23 @@ actors:
 connections: [clock.output -> f.tick]
 run: {stop: 20 s}
 """
+
+
+def test_parameters_are_not_fitted_to_two_models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = Path("line.yaml")
+    path.write_text(LINE, encoding="utf-8")
+    match = {"f.output": measured([1.0, 2.0, 3.0], [1.0, 2.0, 3.0])}
+    run = Simulation.run
+
+    def changing(*given: Any, **more: Any) -> Any:
+        """The run, while somebody edits its model."""
+        path.write_text(LINE.replace("0 * tick", "1 * tick"), encoding="utf-8")
+        return run(*given, **more)
+
+    monkeypatch.setattr(Simulation, "run", changing)
+    with pytest.raises(WorkerError, match=r"^line\.yaml changed while runs were made, and the next ones would be of"):
+        epicycle.search("line.yaml", epicycle.Match(match), vary={"slope": "0.5..3"}, jobs=1)
 
 
 def place(time: float) -> float:

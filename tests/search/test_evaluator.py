@@ -166,6 +166,21 @@ def test_a_model_that_only_this_program_knows(tmp_path: Path) -> None:
         jobs_for(model, 0)
 
 
+def test_other_processes_make_no_runs_of_a_model_that_has_changed_since(tmp_path: Path) -> None:
+    path = tmp_path / "line.yaml"
+    path.write_text(MODEL, encoding="utf-8")
+    recipe = Recipe.of(epicycle.load(path))
+    assert recipe is not None
+    path.write_text(MODEL.replace("slope: 1.0", "slope: 2.0"), encoding="utf-8")
+    with pytest.raises(WorkerError) as error:
+        recipe.model()
+    assert str(error.value) == (
+        f"{path} changed while runs were made, and the next ones would be of another model\n"
+        "   help: finished runs are kept; undo the change and repeat the command to continue them, or repeat it with "
+        "the change to make all runs anew"
+    )
+
+
 MODEL = """
 model: line
 parameters: {slope: 1.0, offset: 0.0}
