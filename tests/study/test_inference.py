@@ -88,6 +88,26 @@ def test_few_values_give_no_false_certainty() -> None:
         assert found.estimate.error == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("exponent", [-1060, -600, 600, 1020])
+def test_numbers_may_be_as_small_or_large_as_floats_are(exponent: int) -> None:
+    """A power of 2 changes the exponents of all numbers, and nothing else."""
+    values = [3.0, 5.0, 4.0, 8.0]
+    usual, other = mean(values), mean([math.ldexp(each, exponent) for each in values])
+    assert (other.value, other.error) == pytest.approx(
+        (math.ldexp(usual.value, exponent), math.ldexp(usual.error, exponent)), rel=1e-3
+    )
+    first, second = dict(enumerate(values)), dict(enumerate([4.0, 7.0, 9.0, 8.0]))
+    scaled = [{at: math.ldexp(each, exponent) for at, each in side.items()} for side in (first, second)]
+    assert paired_difference(scaled[0], scaled[1]).p == pytest.approx(paired_difference(first, second).p, rel=1e-3)
+
+
+def test_a_difference_beyond_the_range_of_floats_is_not_known() -> None:
+    least, greatest = dict.fromkeys(range(3), -1.5e308), {0: 1.5e308, 1: 0.0, 2: 1.0}
+    found = paired_difference(least, greatest)
+    assert (math.isnan(found.p), math.isnan(found.estimate.value)) == (True, True)
+    assert (found.estimate.low, found.estimate.high, found.estimate.count) == (-math.inf, math.inf, 3)
+
+
 @pytest.mark.parametrize("freedom", [1, 2, 3, 4, 9, 19, 29, 60, 199, 200, 201, 999, 5_000])
 def test_students_t_is_scipys_to_twelve_digits(freedom: int) -> None:
     for p in (0.001, 0.025, 0.3, 0.6, 0.9, 0.975, 0.995, 0.99999):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from ...model.language.sampling import SOBOL, Design
-from ..inference import LEVEL, Estimate, deviation, mean, resampled_sums
+from ..inference import LEVEL, Estimate, deviation, in_range, mean, resampled_sums
 from .samples import Levels, Samples, has_enough
 
 FIRST, TOTAL = "first_order", "total"
@@ -75,9 +75,9 @@ def _shares(blocks: Sequence[Sequence[float]], level: float) -> list[dict[str, E
     Physics Communications 117, 1999 (total).
     """
     count = len(blocks)
-    values = [number for block in blocks for number in block]
-    middle = math.fsum(values) / len(values)
-    centred = [[number - middle for number in block] for block in blocks]
+    values, _ = in_range([number for block in blocks for number in block])  # shares are the same in every unit
+    middle, width = math.fsum(values) / len(values), len(blocks[0])
+    centred = [[number - middle for number in values[at : at + width]] for at in range(0, len(values), width)]
     ends = [(block[0], block[-1]) for block in centred]
     sums = _with_resamples([a + b for a, b in ends])
     squares = _with_resamples([a * a + b * b for a, b in ends])

@@ -142,6 +142,13 @@ def test_points_with_missing_numbers_are_left_out_with_their_blocks() -> None:
     assert math.isnan(many.estimate.value)
 
 
+@pytest.mark.parametrize("exponent", [-900, 900])
+def test_shares_do_not_depend_on_the_unit(exponent: int) -> None:
+    study = designed("sobol: {size: 64, seed: 1")
+    usual = sensitivity(samples(study, ishigami), "y")
+    assert sensitivity(samples(study, lambda x: math.ldexp(ishigami(x), exponent)), "y") == usual
+
+
 def test_a_metric_that_does_not_vary_has_no_shares() -> None:
     found = sensitivity(samples(designed("sobol: {size: 16"), lambda x: 0.1), "y")
     assert all(math.isnan(each.estimate.value) for each in found)
