@@ -22,6 +22,7 @@ from ..inference import LEVEL, Estimate, mean, paired_difference, resampled_sums
 from .samples import Levels, Place, Samples, has_enough
 
 RESAMPLES = 9_999
+_TELLING = 2.0**42  # parts of a cost by which two can be told apart
 
 
 @dataclass(frozen=True)
@@ -119,14 +120,18 @@ def _is_not_worse(index: int, fit: list[int], costs: list[dict[int, float]]) -> 
 
 
 def _confidence(costs: list[dict[int, float]]) -> list[float]:
-    """How often each is best when the replications that all have in common are resampled; ties are shared."""
+    """How often each is best when the replications that all have in common are resampled; ties are shared.
+
+    Means are equal if they differ by no more than rounding errors, for which costs are brought to at most 1.
+    """
     common = sorted(set.intersection(*(set(each) for each in costs))) if costs else []
     if not common:
         return [0.0] * len(costs)
     import numpy as np
 
-    sums = resampled_sums([[each[one] for one in common] for each in costs], RESAMPLES)
-    means = np.round(sums / len(common), 12)
+    exponent = math.frexp(max(abs(each[one]) for each in costs for one in common))[1]
+    sums = resampled_sums([[math.ldexp(each[one], -exponent) for one in common] for each in costs], RESAMPLES)
+    means = np.round(sums / len(common) * _TELLING)
     is_best = means == means.min(axis=0)
     ties = np.count_nonzero(is_best, axis=0)
     return [math.fsum((1.0 / ties[best]).tolist()) / RESAMPLES for best in is_best]

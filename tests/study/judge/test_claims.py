@@ -39,7 +39,9 @@ def study_of(text: str) -> Study:
     return study_of_text(text if "study:" in text else HEAD + text, Path("s.yaml"))
 
 
-def table(text: str, numbers: Numbers, runs: int = 30, seed: int = 0, failed: tuple[int, ...] = ()) -> Samples:
+def table(
+    text: str, numbers: Numbers, runs: int = 30, seed: int = 0, failed: tuple[int, ...] = (), unit: float = 1.0
+) -> Samples:
     """Results of a study, with numbers drawn by condition; ``failed`` are replications."""
     study = study_of(text)
     random = np.random.default_rng(seed)
@@ -50,7 +52,7 @@ def table(text: str, numbers: Numbers, runs: int = 30, seed: int = 0, failed: tu
             load: Any = study.dimensions[0].level(condition // 4).values["load"]
             servers = condition % 4 + 1
             value = numbers(load, servers, random)
-            wait = None if value is None else value + luck
+            wait = None if value is None else (value + luck) * unit
             status = "failed" if replication in failed else "ok"
             rows.append(
                 {"condition": condition, "replication": replication, "status": status, "wait": wait, "way": luck}
@@ -351,6 +353,15 @@ def test_guideline_where_all_are_alike() -> None:
     assert [option.confidence for option in found.options] == pytest.approx([0.25] * 4)
     assert (found.not_worse, found.sufficient) == ([1, 2, 3, 4], 1)
     assert sum(option.confidence for option in advice("least: wait", flat)[0].options) == pytest.approx(1.0)
+
+
+@pytest.mark.usefixtures("few_resamples")
+@pytest.mark.parametrize("exponent", [-1000, -50, 1000])
+def test_guideline_does_not_depend_on_the_unit(exponent: int) -> None:
+    usual = advice("least: wait", grows)
+    for one, same in zip(usual, advice("least: wait", grows, unit=2.0**exponent), strict=True):
+        assert [each.confidence for each in same.options] == [each.confidence for each in one.options]
+        assert (same.best, same.not_worse) == (one.best, one.not_worse)
 
 
 @pytest.mark.usefixtures("few_resamples")
