@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import platform
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -22,6 +23,7 @@ except ImportError:  # Windows: nothing keeps two processes from writing to one 
     fcntl = None  # type: ignore[assignment]
 
 _LOGGER = logging.getLogger("epicycle")
+_TRIES, _PAUSE = 25, 0.02  # s
 
 
 @contextmanager
@@ -34,10 +36,10 @@ def lock(folder: Path, share: Share = ALL) -> Iterator[None]:
         with writing(folder):
             folder.mkdir(parents=True, exist_ok=True)
         own = files.enter_context(_opened(folder / "lock"))
-        is_ours, who = _is_locked(own, is_shared=share != ALL), f"pid {os.getpid()}"
+        is_ours, who = _is_locked_soon(own, is_shared=share != ALL), f"pid {os.getpid()}"
         if is_ours and share != ALL:
             own = files.enter_context(_opened(folder / f"lock-{share.file_name}"))
-            is_ours, who = _is_locked(own), f"part {share}: {who} on {platform.node()}"
+            is_ours, who = _is_locked_soon(own), f"part {share}: {who} on {platform.node()}"
         if not is_ours:
             raise StoreError(f"{folder} is in use: another process is writing to it ({', '.join(_writers(folder))})")
         with writing(folder):
@@ -69,6 +71,15 @@ def _opened(path: Path) -> IO[str]:
         if path.exists() and (kind := irregular(path)):
             raise StoreError(f"{path} is {kind}: delete it")
         return path.open("a+", encoding="utf-8")
+
+
+def _is_locked_soon(file: IO[str], *, is_shared: bool = False) -> bool:
+    """Lock a file; those who only look whether somebody holds it, as ``is_running`` does, hold it for a moment."""
+    for _ in range(_TRIES):
+        if _is_locked(file, is_shared=is_shared):
+            return True
+        time.sleep(_PAUSE)
+    return False
 
 
 def _is_locked(file: IO[str], *, is_shared: bool = False) -> bool:

@@ -8,6 +8,7 @@ import os
 import platform
 import signal
 import subprocess
+import threading
 import time
 from collections import Counter
 from pathlib import Path
@@ -178,6 +179,16 @@ def test_one_process_for_each_share(tmp_path: Path) -> None:
     assert not locking.is_running(tmp_path)
     with lock(tmp_path), pytest.raises(EpicycleError, match=f"pid {os.getpid()}"), lock(tmp_path, Share(0, 2)):
         pass
+
+
+def test_looking_whether_somebody_writes_keeps_nobody_from_writing(tmp_path: Path) -> None:
+    """``epicycle status`` holds the lock itself for a moment."""
+    fcntl = pytest.importorskip("fcntl")
+    with (tmp_path / "lock").open("a+") as looking:
+        fcntl.flock(looking, fcntl.LOCK_EX)
+        threading.Timer(0.1, looking.close).start()
+        with lock(tmp_path):
+            assert locking.is_running(tmp_path)
 
 
 @pytest.mark.skipif(locking.fcntl is None, reason="no locks here")
