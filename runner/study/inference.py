@@ -25,8 +25,8 @@ _EXPONENT = 400  # of 2: what is between 2^-400 and 2^400 can be squared and add
 
 
 def is_usable(value: float | None) -> TypeGuard[float]:
-    """Whether statistics can be made of a value: it is a number, and the squares of many such numbers are finite."""
-    return value is not None and abs(value) < 1e150
+    """Whether statistics can be made of a value: it is a number, and sums of some such numbers are finite."""
+    return value is not None and abs(value) < 1e305
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Metrics of which no statistics can be made: their squares are no floats."""
+"""Metrics of which no statistics can be made: they are infinite, or nearly."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ metrics: {size: {of: one.output, take: last, doc: what was sent}}
 """
 
 
-@pytest.mark.parametrize("size", [1e200, -1.7e308, float("inf")])
+@pytest.mark.parametrize("size", [1e306, -1.7e308, float("inf")])
 def test_huge_metrics_count_as_missing(size: float, tmp_path: Path) -> None:
     path = tmp_path / "huge.yaml"
     path.write_text(MODEL, encoding="utf-8")

@@ -22,7 +22,7 @@ from .dimensions import Dimension, Factor, as_factor
 from .fields import TEXTS, Field, Reader, Record, Schema, names_of, node_as, ref
 from .files import named_file
 
-MAX_NUMBER = 1e150  # that statistics can be made of
+MAX_NUMBER = 1e305  # that statistics can be made of
 MAX_CONDITIONS = 10_000  # of a study with claims or a guideline, which evaluate all of them
 
 
@@ -196,7 +196,7 @@ class QuestionReader(NodeReader):
         value = node.value
         if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < MAX_NUMBER:
             return float(value)
-        message = f"{what}: 'than' is neither a number below 1e150 nor a mapping from factors to levels"
+        message = f"{what}: 'than' is neither a number below 1e305 nor a mapping from factors to levels"
         hint = "write a number without a unit, which is that of the metric, or levels such as {load: [0.5, 0.7]}"
         return self.problems.add(message, node.position, hint)
 
