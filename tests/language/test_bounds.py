@@ -69,3 +69,15 @@ def test_what_is_not(changes: dict[str, str], message: str, tmp_path: Path) -> N
     (problem,) = raised.value.problems
     assert problem.message == message
     assert problem.position is not None
+
+
+def test_choices_are_texts(tmp_path: Path) -> None:
+    file = tmp_path / "m.yaml"
+    file.write_text('model: m\nparameters: {n: {value: 2, choices: [1, 2]}}\nrun: {stop: "${n} s"}\n')
+    with pytest.raises(ModelError) as raised:
+        load_model(file)
+    (problem,) = raised.value.problems
+    assert (problem.message, problem.help) == (
+        "n: 2 is not one of 1, 2",
+        ("the choices are texts: write '2' in quotes",),
+    )
