@@ -228,6 +228,14 @@ def test_a_packaged_model_may_be_extended(tmp_path: Path) -> None:
     assert load_model(tmp_path / "m.yaml").parameters["load"] == 0.1
 
 
+def test_an_empty_list_of_a_run_replaces_that_of_the_base(tmp_path: Path) -> None:
+    run = "run: {stop: 1 s, stop_when: clock.output, record: clock.output}"
+    (tmp_path / "base.yaml").write_text(f"model: base\nactors: {{clock: {{type: Clock, period: 1}}}}\n{run}\n")
+    (tmp_path / "m.yaml").write_text("model: m\nextends: base.yaml\nrun: {stop_when: , record: []}\n")
+    output = load_model(tmp_path / "m.yaml").output
+    assert (output.recorded, output.stop_ports, output.stop_time) == ([], [], 10**9)
+
+
 def test_a_copy_of_a_class_that_the_base_has_too(tmp_path: Path) -> None:
     (tmp_path / "lib").mkdir()
     part = "composites: {Part: {actors: {r: {type: Ramp}}}}\n"

@@ -63,7 +63,7 @@ class OutputReader:
         run, local = text.run, Locals("", names)
         for watch, patterns in ((self.record, run.record), (self.stop_when, run.stop_when)):
             seen: set[str] = set()  # each once: a pattern may select all of a model
-            for pattern in (each for each in patterns if each and each.text not in seen):
+            for pattern in (each for each in patterns or () if each and each.text not in seen):
                 seen.add(pattern.text)
                 watch(pattern)
         for key, computed in (("stop", run.stop), ("seed", run.seed)):

@@ -61,7 +61,7 @@ def inherit(
 def extended(base: ModelText, text: ModelText, problems: Problems) -> ModelText:
     """A model with what it inherits from another one; metrics, monitors and figures are whole ones, by name."""
     root = _Heir(base.root, text.root, problems).composite()
-    run = {key: each for key, each in vars(text.run).items() if each not in (None, ())}
+    run = {key: each for key, each in vars(text.run).items() if each is not None}
     return replace(
         text,
         root=replace(root, written=(*base.root.written, *text.root.written)),

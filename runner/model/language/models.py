@@ -208,16 +208,16 @@ class RunText:
     stop: Computed | None = keyed(
         computed_as(TIME, nanoseconds), "Time at which a run ends, such as 30 s.", default=None
     )
-    stop_when: tuple[Text | Poison, ...] = keyed(
+    stop_when: tuple[Text | Poison, ...] | None = keyed(
         PATTERNS,
         "Output ports that end the run: at true, at a number other than 0, at any crossing of an `ODE`.",
-        default=(),
+        default=None,
     )
     seed: Computed | None = keyed(
         computed_as(Parameter(int, min=0, max=MAX_SEED)), "Seed of all random streams.", default=None
     )
-    record: tuple[Text | Poison, ...] = keyed(
-        PATTERNS, "Output ports whose tokens are recorded, as patterns.", default=()
+    record: tuple[Text | Poison, ...] | None = keyed(
+        PATTERNS, "Output ports whose tokens are recorded, as patterns.", default=None
     )
 
 
