@@ -12,9 +12,10 @@ from typing import Any
 import pytest
 
 from epicycle.actors import Actor, InputPort, Parameter, declared_parameters
-from epicycle.runner import Simulation, load_composite, load_model
+from epicycle.runner import ModelError, Simulation, load_composite, load_model
 from epicycle.runner.model.build.model import Model
 from epicycle.runner.model.catalogue.packaged import model_folders
+from epicycle.runner.model.language import surroundings
 from tests.model.model_parts import TYPES
 
 SHORT = """
@@ -204,3 +205,20 @@ def test_the_flagship_fits_on_a_slide() -> None:
     assert lines["collision_avoidance"] <= 130
     assert lines["mobile_robot"] <= 60
     assert sum(len(path.read_text().splitlines()) for path in PACKAGED) <= 2500
+
+
+def test_parts_with_too_many_types_to_choose_from(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A short file may name very many: as many as it has parts, times the choices."""
+    monkeypatch.setattr(surroundings, "MAX_CHOICES", 5)
+    actors = "actors:\n" + "".join(f"  {name}: {{type: '${{kind}}', period: 1}}\n" for name in ("a", "b"))
+    (tmp_path / "m.yaml").write_text(
+        f"model: m\nparameters: {{kind: {{value: x, choices: {{x: Clock, y: Clock, z: Clock}}}}}}\n{actors}"
+    )
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ModelError) as caught:
+        load_model("./m.yaml")
+    assert str(caught.value) == (
+        "m.yaml:5:13: error: m: the types that parts may have are more than 5 together\n"
+        "    5 |   b: {type: '${kind}', period: 1}\n"
+        "      |             ^^^^^^^^^"
+    )

@@ -38,6 +38,7 @@ from .usage import ALL, used_names
 
 _ALONE = re.compile(r"\$\{\s*([A-Za-z_][A-Za-z0-9_]*)\s*\}")  # a value that is a parameter, unchanged
 _LOWER = ("min", "above")
+MAX_CHOICES = 100_000  # of the types of all parts together: each is a part to be checked
 
 Known: TypeAlias = ParameterText | Parameter[Any]
 Takers: TypeAlias = dict[str, list[tuple[str, Known]]]  # by name, who takes a value unchanged: as Type.name
@@ -64,6 +65,7 @@ class Surroundings:
         self.problems = problems
         self._catalogue = catalogue
         self._classes: dict[tuple[str, str], type | None] = {}  # by the key of a model, and the name
+        self._chosen = 0  # types that parts may have, so far
         for name in _inner_first(self.composites):
             if composite := self.composites[name]:
                 self.composites[name] = self.composite(composite)
@@ -97,6 +99,10 @@ class Surroundings:
         """A part with the values that it takes, also added to ``taken``; or with each type that it may have."""
         if "${" in part.type.text and key in ("actors", "refinements"):
             types = {} if part.choices else self._choices(owner, part, key)
+            self._chosen += len(types)
+            if self._chosen > MAX_CHOICES:
+                message = f"{owner.name}: the types that parts may have are more than {MAX_CHOICES:,} together"
+                self.problems.stop(message, part.type.position)
             choices = {name: self._part(owner, replace(part, type=each), key, taken) for name, each in types.items()}
             return replace(part, choices=part.choices or choices)
         known = self._known(key, part.type.text)
