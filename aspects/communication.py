@@ -7,7 +7,16 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import Exponential, Normal, Parameter, Stream, Uniform, texts_parameter
+from epicycle.actors import (
+    Exponential,
+    Normal,
+    Parameter,
+    Stream,
+    Uniform,
+    texts_parameter,
+    to_nanoseconds,
+    to_seconds,
+)
 
 from .core import CommunicationAspect, JoinPoint, LawParameter, RandomLoss, altered, is_bad, law
 
@@ -65,10 +74,11 @@ class Latency(CommunicationAspect):
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         delay = max(0.0, self.delay + self.jitter * law(self.distribution, LAWS).draw(point.random))
-        if not self.reordering:
-            now = point.now
-            delay = max(delay, point.memory.get("last", 0.0) - now)
-            point.memory["last"] = now + delay
+        if not self.reordering:  # in whole nanoseconds: late in a long run, seconds are too coarse to keep an order
+            now = point.tag.time
+            last = point.memory.get("last", now)
+            point.memory["last"] = max(now + to_nanoseconds(delay), last)
+            delay = max(delay, to_seconds(last - now))
         point.delay(token, delay)
 
 
@@ -171,14 +181,15 @@ class Throttle(CommunicationAspect):
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         # Permits below zero are reserved for waiting messages.
-        permits, since = point.memory.get("permits", (float(self.burst), point.now))
-        permits = min(float(self.burst), permits + (point.now - since) * self.rate)
+        now = point.tag.time
+        permits, since = point.memory.get("permits", (float(self.burst), now))
+        permits = min(float(self.burst), permits + to_seconds(now - since) * self.rate)
         if permits >= 1.0 - 1e-9:  # rounding must not drop a message that comes exactly on time
-            point.memory["permits"] = (permits - 1.0, point.now)
+            point.memory["permits"] = (permits - 1.0, now)
             point.forward(token)
         elif self.excess == DROP:
-            point.memory["permits"] = (permits, point.now)
+            point.memory["permits"] = (permits, now)
             point.act("dropped", token)
         else:
-            point.memory["permits"] = (permits - 1.0, point.now)
+            point.memory["permits"] = (permits - 1.0, now)
             point.delay(token, (1.0 - permits) / self.rate)

@@ -55,6 +55,12 @@ def test_latency_in_order() -> None:
         assert time == pytest.approx(latest, abs=1e-5)
 
 
+def test_latency_keeps_the_order_late_in_a_long_run() -> None:
+    late = [(1e7 + number / 1000, "a.port", number) for number in range(1000)]
+    bench = Bench(Latency(delay="5 ms", jitter="5 ms")).play_at(late)
+    assert bench.tokens == list(range(1000))
+
+
 def test_constant_latency() -> None:
     assert Bench(Latency(delay="5 ms")).play("ab").passed == [(5.0, "a"), (6.0, "b")]
 
@@ -105,6 +111,8 @@ def test_throttle_lets_what_is_on_time_pass() -> None:
     for excess in ("drop", "delay"):
         assert len(Bench(Throttle(rate=10, excess=excess)).play(range(200), period=100).passed) == 200
         assert Bench(Throttle(rate=10, excess=excess)).play(range(200), period=100).told == []
+        late = [(1e7 + number / 10, "a.port", number) for number in range(200)]  # after some months
+        assert Bench(Throttle(rate=10, excess=excess)).play_at(late).told == []
 
 
 @pytest.mark.parametrize("kind", ["gaussian", "bit_flip"])
