@@ -119,7 +119,11 @@ class Reorder(CommunicationAspect):
             point.act("held", token)
             held.append([self.overtaken_by, token])
             return
+        self.pass_by(token, point)
+
+    def pass_by(self, token: Any, point: JoinPoint) -> None:
         point.forward(token)
+        held: list[list[Any]] = point.memory.get("held", [])
         for waiting in held:
             waiting[0] -= 1
         while held and held[0][0] <= 0:

@@ -16,6 +16,7 @@ from epicycle.aspects import (
     Throttle,
 )
 from tests.aspects.bench import Bench
+from tests.aspects.execution.execution_parts import chain, sent
 from tests.aspects.laws import COUNT, SURE, Reading
 
 
@@ -88,6 +89,11 @@ def test_reordering() -> None:
     free = [token for token in always.tokens if token not in set(held)]
     assert free == sorted(free)
     assert len(always.tokens) + len(set(held) - set(always.tokens)) == 2000
+
+
+def test_messages_are_released_after_the_aspect_has_ended() -> None:
+    _, results = chain("type: Reorder, probability: 1, overtaken_by: 2, until: 2 s, at: a.input")
+    assert [token for _, token in sent(results)] == [2, 3, 0, 1, 4, 5]
 
 
 @pytest.mark.parametrize("excess", ["drop", "delay"])
