@@ -65,8 +65,8 @@ class StuckAt(MeasurementAspect):
     """Repeats the last good measurement while the sensor is stuck, with the time of the one that it replaces.
 
     At each measurement, a working sensor gets stuck with probability ``p`` and a stuck one recovers with probability
-    ``r``, like the channel of ``GilbertElliott``; the first measurement is always good.  Event: ``replaced``, with the
-    old measurement.
+    ``r``, like the channel of ``GilbertElliott``; the first measurement is always good, also each time that the aspect
+    becomes active.  Event: ``replaced``, with the old measurement.
     """
 
     events: ClassVar[tuple[str, ...]] = ("replaced",)
@@ -85,6 +85,10 @@ class StuckAt(MeasurementAspect):
         else:
             point.memory["good"] = token
             point.forward(token)
+
+    def pass_by(self, token: Any, point: JoinPoint) -> None:
+        point.memory.clear()  # what was good before is long out of date when the sensor gets stuck again
+        point.forward(token)
 
 
 class Alteration(MeasurementAspect):

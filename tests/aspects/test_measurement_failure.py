@@ -13,6 +13,7 @@ from epicycle.aspects import (
     StuckAt,
 )
 from tests.aspects.bench import Bench
+from tests.aspects.execution.execution_parts import chain, sent
 from tests.aspects.laws import COUNT, SURE, lost_of, runs
 
 
@@ -43,3 +44,8 @@ def test_stuck() -> None:
     low, high = stats.binom.interval(SURE, int((~stuck).sum()), 0.05)
     assert low <= len(starts) <= high
     assert Bench(StuckAt(p=1)).play(range(4)).tokens == [0, 0, 0, 0]
+
+
+def test_a_sensor_that_sticks_again_repeats_nothing_from_before_it_worked() -> None:
+    _, results = chain("type: StuckAt, p: 1, until: 2 s, every: 4 s, at: t.output")
+    assert [token for _, token in sent(results)] == [0, 0, 2, 3, 4, 4]
