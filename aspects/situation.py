@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from itertools import takewhile
 from typing import Any, ClassVar
 
-from epicycle.actors import EpicycleError, Parameter, elementary
+from epicycle.actors import EpicycleError, Parameter, counted, elementary
 from epicycle.actors.expression import PortFormula, PortFormulaParameter, operand
 
 from .core import (
@@ -219,6 +219,12 @@ def _position(port: str, point: JoinPoint) -> Position | None:
     if not (isinstance(position, list) and position and all(_is_number(each) for each in position)):
         raise SituationError(
             f"{port} does not send a position: expected numbers, or a token with such a field 'position'"
+        )
+    first, count = point.memory.setdefault("dimensions", (port, len(position)))
+    if len(position) != count:
+        raise SituationError(
+            f"{port} sends positions of {counted(len(position), 'number')}, but {first} of {count}: they cannot be "
+            "compared"
         )
     return [float(each) for each in position]
 

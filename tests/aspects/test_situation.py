@@ -197,6 +197,23 @@ def test_nobody_knows_where(positions: list[str], sender: str, message: str) -> 
     assert str(caught.value) == message
 
 
+@pytest.mark.parametrize(
+    "aspect",
+    [
+        RangeLoss(positions=["a.at", "b.at"], sender="token.robot", range=3),
+        OutOfRange(positions=["a.at"], target="b.at", range=3),
+        Occlusion(positions=["a.at", "c.at", "b.at"], target="c.at", radius=3),
+    ],
+)
+def test_positions_in_the_plane_and_in_space(aspect: Any) -> None:
+    with pytest.raises(SituationError) as caught:
+        Bench(aspect, world={"a.at": [0.0, 1.0], "b.at": [1.0, 1.0, 2.0], "c.at": [1.0, 1.0]}).play([Message("b")])
+    assert str(caught.value) in (
+        "b.at sends positions of 3 numbers, but a.at of 2: they cannot be compared",
+        "a.at sends positions of 2 numbers, but b.at of 3: they cannot be compared",
+    )
+
+
 def test_messages_pass_until_all_have_said_where_they_are() -> None:
     aspect = RangeLoss(positions=["a.at", "b.at"], sender="token.robot", range=1, shadowing=0)
     assert lost(aspect, {"a.at": [0.0]}, 1) == 0
