@@ -330,7 +330,8 @@ class CrashRestart(ExecutionAspect):
                 target.later(to_seconds(time - now), self._crash, target)
             else:
                 self._crash(target)
-        self._await_failure(target)
+        if life.since is None:  # otherwise after the repair
+            self._await_failure(target)
 
     def schedule(self, job: Job, point: ActorPoint) -> None:
         point.forward(job)  # while it is down, no jobs come here

@@ -105,6 +105,21 @@ def test_crashes_of_all_kinds() -> None:
     assert [act[0] for act in acts(conditional) if act[1] == "crashed"] == [6.5]
 
 
+def test_failures_after_a_crash_at_the_start() -> None:
+    text = """
+actors: {{t: {{type: Ticker, period: 50 s}}, sum: {{type: Adder, count: 1000}}}}
+connections: ["t.output -> sum[*].input"]
+aspects: {{crash: {{type: CrashRestart, {}}}}}
+run: {{stop: 200 s}}
+"""
+    results = run('times: [0 s], repair: 1 s, mtbf: 10 s, at: "sum[*]"', text)
+    failures: dict[str, float] = {}
+    for time, event, actor, _ in acts(results):
+        if event == "crashed" and time > 0:
+            failures.setdefault(actor, time - 1)
+    assert stats.kstest(list(failures.values()), stats.expon(scale=10).cdf).pvalue > 0.001
+
+
 def test_a_composite_goes_down_as_a_whole() -> None:
     text = """
 composites:
