@@ -241,7 +241,12 @@ class Quantise(Alteration):
     step = Parameter(float, min=0.0, doc="size of the step, in the number's own unit")
 
     def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
-        return numbers if self.step == 0.0 else self.step * np.rint(numbers / self.step)
+        if self.step == 0.0:
+            return numbers
+        with np.errstate(over="ignore"):
+            steps = numbers / self.step
+        # A number with so many steps is a multiple to all its digits.
+        return np.where(np.isinf(steps), numbers, self.step * np.rint(steps))
 
 
 class Saturate(Alteration):

@@ -62,6 +62,7 @@ def test_drift() -> None:
 
 def test_quantise_saturate_bias() -> None:
     assert Bench(Quantise(step=0.5)).play([0.2, 0.3, 0.75, -1.1]).tokens == [0.0, 0.5, 1.0, -1.0]
+    assert Bench(Quantise(step=1e-10)).play([1e300, -math.inf]).tokens == [1e300, -math.inf]  # 1e310 steps
     assert Bench(Saturate(low=-1, high=2)).play([-3.0, 0.5, 7]).tokens == [-1.0, 0.5, 2]
     assert Bench(Bias(by=0.5)).play([1.0, Reading("a", 2.0)], period=1).tokens == [1.5, Reading("a", 2.5)]
 
