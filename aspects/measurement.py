@@ -47,11 +47,16 @@ class MeasurementFailure(RandomLoss, MeasurementAspect):
     )
 
     def check(self) -> None:
-        if self.burst is not None and self.probability > self.burst / (self.burst + 1.0):
+        if self.burst is None:
+            return
+        if self.burst == math.inf:
+            raise EpicycleError("burst: the mean of runs must be finite")
+        if self.probability > self.burst / (self.burst + 1.0):
+            least = math.inf if self.probability == 1.0 else self.probability / (1.0 - self.probability)
             raise EpicycleError(
                 f"failures with probability {self.probability:g} cannot come in runs of {self.burst:g} on average: "
-                f"a working sensor works for at least one measurement; burst must be "
-                + ("infinite" if self.probability == 1.0 else f">= {self.probability / (1.0 - self.probability):g}")
+                f"a working sensor works for at least one measurement; "
+                + (f"burst must be >= {least:g}" if least < math.inf else "leave out 'burst'")
             )
 
     def draw(self, point: JoinPoint) -> bool:

@@ -116,6 +116,14 @@ def test_tokens_that_cannot_be_altered(aspect: Aspect, token: Any, message: str)
                 "least one measurement; burst must be >= 9"
             ),
         ),
+        (
+            lambda: MeasurementFailure(probability=1, burst=2),
+            (
+                "failures with probability 1 cannot come in runs of 2 on average: a working sensor works for at "
+                "least one measurement; leave out 'burst'"
+            ),
+        ),
+        (lambda: MeasurementFailure(probability=0.5, burst=math.inf), "burst: the mean of runs must be finite"),
     ],
 )
 def test_wrong_parameters(make: Callable[[], Aspect], message: str) -> None:
