@@ -175,10 +175,10 @@ class Switch(Actor):
         if self.control.present and self.outside == "nothing":
             self._channel = self.control.value
         elif self.control.present:
-            self._channel = _channel(self.control.value, self.control, width, "output")
+            self._channel = _channel(self.control.value, self.control.path, width, "output")
         if self.outside == "error" or 0 <= self._channel < width:
             for token in self.input.tokens:
-                self.output.send(token, self._channel)
+                self.output.send(token, self._channel if width else None)
 
 
 class BooleanSwitch(Actor):
@@ -220,6 +220,8 @@ class Select(Actor):
 
     def initialize(self) -> None:
         self._channel = self.initial
+        if self.initial is not None and self.unread == "lost":
+            _channel(self.initial, f"{self.path}.initial", self.input.width, "input")
         self._controls: deque[int] = deque()
         self._waiting = Queues(self.input)
 
@@ -231,7 +233,7 @@ class Select(Actor):
                 pass
             return
         if self.control.present:
-            self._channel = _channel(self.control.value, self.control, self.input.width, "input")
+            self._channel = _channel(self.control.value, self.control.path, self.input.width, "input")
         for token in () if self._channel is None else self.input.by_channel()[self._channel]:
             self.output.send(token)
 
@@ -359,7 +361,7 @@ class Synchronizer(ByChannel):
                 self.send(token, channel)
 
 
-def _channel(number: int, control: InputPort[Any], width: int, name: str) -> int:
+def _channel(number: int, told_by: str, width: int, name: str) -> int:
     if not 0 <= number < max(width, 1):
-        raise PortError(f"{control.path} is {number}, but {name} has {counted(width, 'channel')}, counted from 0")
+        raise PortError(f"{told_by} is {number}, but {name} has {counted(width, 'channel')}, counted from 0")
     return int(number)
