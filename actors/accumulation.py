@@ -5,7 +5,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, elementary, present, rounds, to_seconds
+from .core import (
+    Actor,
+    EpicycleError,
+    InputPort,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    elementary,
+    present,
+    rounds,
+    to_seconds,
+)
 
 
 class Counter(Actor):
@@ -49,6 +60,10 @@ class Accumulator(Actor):
     reset_by = Parameter(str, "any", choices=("any", "true"), doc="which tokens reset: any, or only true ones")
     low = Parameter(int | float, None, doc="the lowest value of the sum")
     high = Parameter(int | float, None, doc="the highest value of the sum")
+
+    def check(self) -> None:
+        if self.low is not None and self.high is not None and self.low > self.high:
+            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low must not be above high")
 
     def initialize(self) -> None:
         self._sum = self.initial

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from epicycle.runner.execution.engine import ActorError, Simulation
 from epicycle.runner.model.text.problems import ModelError
 from tests.actors.feeding import feed, load, model_of, seconds, tokens
+from tests.actors.library_parts import problem
 
 
 @settings(max_examples=30, deadline=None)
@@ -128,6 +129,11 @@ def test_integrals_are_those_of_numpy(signal: list[tuple[int, float]]) -> None:
         _, sent, _ = feed(actor, {"input": events, "trigger": [(5.0, 0)]})
         expected = [1.0, *(1.0 + np.cumsum(areas))]
         assert tokens(sent) == pytest.approx([*expected, expected[-1] + (5.0 - times[-1]) * values[-1]], abs=1e-9)
+
+
+def test_limits_of_a_sum_that_exclude_each_other() -> None:
+    message = "it: low is 2 and high is 1: low must not be above high"
+    assert problem("{type: Accumulator, low: 2, high: 1}", [("input", [])]) == message
 
 
 def test_sums_counts_and_differences() -> None:
