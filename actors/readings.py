@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,10 @@ from .core import EpicycleError, InputPort, brief, counted
 def finite_number(port: InputPort[Any], token: Any) -> float:
     """The token of a port as a float; raises ``EpicycleError`` if it is not a finite number."""
     if isinstance(token, (float, int, np.integer, np.floating)) and not isinstance(token, bool):
-        number = float(token)
-        if math.isfinite(number):
-            return number
+        with suppress(OverflowError):  # a whole number may be too large for a float
+            number = float(token)
+            if math.isfinite(number):
+                return number
     raise EpicycleError(f"{port.path} got {brief(token)}, expected a finite number")
 
 

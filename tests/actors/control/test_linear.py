@@ -305,6 +305,7 @@ def test_systems_that_are_none(kind: Any, parameters: dict[str, Any], message: s
     ("actor", "token", "message"),
     [
         (LAG, "fast", "it.input got 'fast', expected a finite number"),
+        pytest.param(LAG, 10**400, f"it.input got 1{'0' * 56}..., expected a finite number", id="huge"),
         (LAG, True, "it.input got true, expected a finite number"),
         ({"type": "StateSpace", "a": [[0]], "b": [[1, 2]]}, [1.0],
          "it.input got [1.0], expected a list of 2 numbers"),
