@@ -180,6 +180,8 @@ class Batch(Actor):
         weight = 0.0
         if self.size is not None:
             weight = self.weight.number("a weight", token, self.now)
+            if weight < 0:
+                raise EpicycleError(f"{self.weight} gives {weight:g} for {brief(token)}, but a weight must be >= 0")
             if key in self._batches and self._batches[key].size + weight > self.size:
                 self._close(key)
         batch = self._batches.get(key)

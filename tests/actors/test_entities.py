@@ -72,6 +72,8 @@ def test_a_token_is_not_changed_for_others() -> None:
         ("Unbatch", [("input", [[0, 5]])], "5 is not a list"),
         ("Batch, size: 3, weight: token", [("input", [[0, "heavy"]])],
          "'token' gives 'heavy', but a weight must be a finite number"),
+        ("Batch, size: 3, weight: token", [("input", [[0, -1]])],
+         "'token' gives -1 for -1, but a weight must be >= 0"),
         ("Batch", [("input", [[0, 5]])], "it never sends: give 'number', 'size' or 'after', or connect 'trigger'"),
     ],
 )  # fmt: skip
