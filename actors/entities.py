@@ -310,5 +310,5 @@ def _hashable(key: Any) -> Hashable:
     if isinstance(key, list):
         return tuple(map(_hashable, key))
     if isinstance(key, Mapping):
-        return tuple((name, _hashable(value)) for name, value in key.items())
+        return frozenset((name, _hashable(value)) for name, value in key.items())
     return key  # type: ignore[no-any-return]

@@ -38,6 +38,9 @@ from tests.actors.library_parts import Feeds, behave, problem, tokens
         ("Match, key: id", [("input", [[0, {"id": 1}], [0, {"id": 2}]]), ("input", [[1, {"id": 2}], [2, {"id": 1}]])],
          [(0, 1, "waiting", 2), (1, 1, "output", [{"id": 2}, {"id": 2}]), (1, 1, "waiting", 1),
           (2, 1, "output", [{"id": 1}, {"id": 1}]), (2, 1, "waiting", 0)]),
+        # The order of fields does not count.
+        ("Match, key: id", [("input", [[0, {"id": {"a": 1, "b": 2}}]]), ("input", [[0, {"id": {"b": 2, "a": 1}}]])],
+         [(0, 1, "output", [{"id": {"a": 1, "b": 2}}, {"id": {"b": 2, "a": 1}}])]),
         ("Match", [("input", [[0, 1], [1, 2]]), ("input", [[1, 3], [1, 4]])],
          [(0, 1, "waiting", 1), (1, 1, "output", [1, 3]), (1, 1, "output", [2, 4]), (1, 1, "waiting", 0)]),
     ],
