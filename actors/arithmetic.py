@@ -77,6 +77,8 @@ class Extreme(Actor):
     def fire(self) -> None:
         for (tokens,) in rounds(self.input):
             there = [channel for channel, token in enumerate(tokens) if token is not ABSENT]
+            if any(_is_nan(tokens[channel]) for channel in there):
+                raise EpicycleError("nan is neither greater nor less than a number")
             best = max if self.take == "greatest" else min
             channel = best(there, key=tokens.__getitem__)
             self.value.send(tokens[channel])
@@ -100,7 +102,13 @@ class Scale(Actor):
             self.output.send(self.factor * token + self.offset)
 
 
+def _is_nan(x: Any) -> bool:
+    return isinstance(x, float) and math.isnan(x)
+
+
 def _sign(x: float) -> int:
+    if _is_nan(x):
+        raise ValueError
     return (x > 0) - (x < 0)
 
 

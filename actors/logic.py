@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from .core import ABSENT, Actor, InputPort, Latest, OutputPort, Parameter, any_parameter, present, rounds
+from .core import ABSENT, Actor, EpicycleError, InputPort, Latest, OutputPort, Parameter, any_parameter, present, rounds
 from .expression import operand
 
 GATES: Final[dict[str, Callable[[list[bool]], bool]]] = {
@@ -80,7 +80,13 @@ class Comparator(Actor):
     def fire(self) -> None:
         compare = COMPARISONS[self.comparison]
         for values in self._latest.rounds():
-            self.output.send(compare(values["left"], values.get("right", self.value), self.tolerance))
+            left, right = values["left"], values.get("right", self.value)
+            try:
+                holds = compare(left, right, self.tolerance)
+            except TypeError:
+                how = f"{self.comparison}, with a tolerance" if self.tolerance else self.comparison
+                raise EpicycleError(f"{left!r} and {right!r} cannot be compared by {how}") from None
+            self.output.send(holds)
 
 
 class Equals(Actor):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import Any
 
 from .core import (
     Actor,
+    EpicycleError,
     InputPort,
     OutputPort,
     Parameter,
@@ -71,9 +73,9 @@ class Timer(_Timing):
             self._running.put(None, self.checked(delay))
 
     def checked(self, delay: float) -> float:
-        """A time that a token gives; raises ``ValueError`` for one below 0."""
-        if delay < 0:
-            raise ValueError(f"{self.input.path} is {delay:g} s, but a timer needs a time >= 0")
+        """A time that a token gives; raises ``EpicycleError`` for one below 0."""
+        if not delay >= 0:
+            raise EpicycleError(f"{self.input.path} is {delay:g} s, but a timer needs a time >= 0")
         return delay
 
 
@@ -97,6 +99,8 @@ class ResettableTimer(_Timing):
             self._wake = None
             self.output.send(self.value)
         for delay in self.input.tokens:
+            if math.isnan(delay):
+                raise EpicycleError(f"{self.input.path} is nan s, which is neither a time nor negative")
             if self.preemptive:
                 self._stop()
                 self._wake = self.wake_in(delay) if delay >= 0 else None

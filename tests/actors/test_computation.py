@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from epicycle.actors import EpicycleError, Function, ParameterError
 from epicycle.actors.expression import Formula, operand
-from epicycle.runner.execution.engine import ActorError
+from epicycle.runner.execution.engine import ActorError, Simulation
 from epicycle.runner.model.text.problems import ModelError
 from tests.actors.feeding import feed, load, model_of, seconds, tokens
 
@@ -324,6 +324,43 @@ def test_math_functions(function: str, oracle: Any) -> None:
         else:
             with pytest.raises(ActorError, match=re.escape(f"{function} of {argument!r} is not a real number")):
                 feed(actor, {"input": [(1.0, argument)]})
+
+
+@pytest.mark.parametrize(
+    ("actor", "inputs", "reason"),
+    [
+        ({"type": "Comparator", "comparison": "<"}, {"left": [(1.0, "a")]}, "'a' and 0 cannot be compared by <"),
+        ({"type": "Comparator", "comparison": "==", "value": "a", "tolerance": 1}, {"left": [(1.0, "a")]},
+         "'a' and 'a' cannot be compared by ==, with a tolerance"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_compared(actor: dict[str, Any], inputs: dict[str, Any], reason: str) -> None:
+    with pytest.raises(ActorError) as caught:
+        feed(actor, inputs)
+    assert caught.value.reason == reason
+
+
+@pytest.mark.parametrize(
+    ("actor", "reason"),
+    [
+        ("MathFunction, function: sign", "sign of nan is not a real number, or is too large"),
+        ("Extreme, take: least", "nan is neither greater nor less than a number"),
+        ("Timer", "it.input is nan s, but a timer needs a time >= 0"),
+        ("ResettableTimer", "it.input is nan s, which is neither a time nor negative"),
+    ],
+)
+def test_nan_has_no_order(actor: str, reason: str) -> None:
+    text = f"""
+model: m
+actors:
+  clock: {{type: Clock, period: 1 s, values: [1.0, .nan]}}
+  it: {{type: {actor}}}
+connections: [clock.output -> it.input]
+run: {{stop: 1 s}}
+"""
+    with pytest.raises(ActorError) as caught:
+        Simulation(load(text)).run()
+    assert (caught.value.reason, caught.value.tag.time) == (reason, 10**9)
 
 
 GATES = {
