@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -14,6 +15,7 @@ from .core import (
     any_parameter,
     array_parameter,
     counted,
+    declared_parameters,
     elementary,
     token_type,
 )
@@ -27,6 +29,14 @@ class Distribution(Configurable):
     """
 
     token_type: Any = float
+
+    def _configure(self, values: Mapping[str, object]) -> None:
+        super()._configure(values)
+        for name, parameter in declared_parameters(type(self)).items():
+            value = getattr(self, name)
+            # Draws would be infinite, or NaN; a law of your own may have such a default.
+            if isinstance(value, float) and math.isinf(value) and value != parameter.default:
+                raise ParameterError(f"{type(self).__name__}.{name}: {value:g} is not a finite number", (name,))
 
     def draw(self, random: Stream) -> Any:
         """A value drawn from the given stream."""

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from scipy import stats
 
-from tests.actors.library_parts import behave, tokens
+from tests.actors.library_parts import behave, problem, tokens
 
 
 @pytest.mark.parametrize(
@@ -48,3 +48,16 @@ def test_a_cauchy_distribution_that_is_cut_off() -> None:
     low, high = law.cdf(-2.0), law.cdf(4.0)
     assert stats.kstest(drawn, lambda x: (law.cdf(x) - low) / (high - low)).pvalue > 1e-3
     assert -2.0 <= min(drawn) < -1.9 < 3.9 < max(drawn) <= 4.0
+
+
+@pytest.mark.parametrize(
+    ("distribution", "message"),
+    [
+        ("{type: Gamma, shape: .inf}", "Gamma.shape: inf is not a finite number"),
+        ("{type: Uniform, low: -.inf}", "Uniform.low: -inf is not a finite number"),
+        ("{type: Constant, value: .inf}", "Constant.value: inf is not a finite number"),
+    ],
+)
+def test_distributions_without_end(distribution: str, message: str) -> None:
+    actor = f"{{type: Random, distribution: {distribution}}}"
+    assert problem(actor, [("trigger", [])]) == f"it.distribution: {message}"
