@@ -158,7 +158,7 @@ class Sheet:
         from matplotlib.text import Text
 
         for text in self.canvas.findobj(Text):  # the sheet grows with its texts, however long names are
-            text.set_text(shortened(text.get_text(), MAX_TEXT))
+            text.set_text(visible_lines(shortened(text.get_text(), MAX_TEXT)))
         self.canvas.draw_without_rendering()
         self.canvas.set_layout_engine("none")  # all files keep the layout for which tips are placed
         box = self.canvas.get_tightbbox().padded(_PAD)

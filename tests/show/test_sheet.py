@@ -51,6 +51,7 @@ def test_tips_are_text_whatever_they_say(tmp_path: Path) -> None:
     written = (tmp_path / "f.svg").read_bytes()
     tags = {element.tag.rpartition("}")[2] for element in ElementTree.fromstring(written).iter()}
     assert "script" not in tags
+    assert "\u202e" not in written.decode()  # which viewers would obey
     found = tips_of(written)
     assert found is not None
     assert [tip.text for tip in found.tips] == ['<script>alert(1)</script> & "]]>" \'--> \\x1b\\u202e\nsecond line']

@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from epicycle.actors import visible_lines
+
 LEVEL = 6  # of compression: a higher one takes several times as long and saves a few per cent
 
 Column = tuple[str, int, int]  # its kind (i, f or d), offset, and number of values
@@ -43,8 +45,8 @@ class Pack:
             return self._put("f", np.asarray(numbers, dtype=float).astype("<f4").ravel())
 
     def texts(self, texts: Iterable[str]) -> tuple[Column, Column]:
-        """Texts: a column of bytes, and one with the length of each."""
-        coded = [text.encode("utf-8", "replace") for text in texts]
+        """Texts, with what would be hidden in them: a column of bytes, and one with the length of each."""
+        coded = [visible_lines(text).encode("utf-8", "replace") for text in texts]
         joined = np.frombuffer(b"".join(coded), dtype=np.uint8)
         return self._put("b", joined), self.whole([len(each) for each in coded])
 
@@ -57,6 +59,15 @@ class Pack:
         return column
 
     def text(self, about: Any) -> str:
-        """Everything as base64."""
-        head = json.dumps(about, ensure_ascii=True, separators=(",", ":"), allow_nan=False).encode()
+        """Everything as base64; hidden characters in it are shown, as in all our HTML."""
+        head = json.dumps(_visible(about), ensure_ascii=True, separators=(",", ":"), allow_nan=False).encode()
         return b64encode(zlib.compress(b"".join((struct.pack("<I", len(head)), head, *self._parts)), LEVEL)).decode()
+
+
+def _visible(data: Any) -> Any:
+    """Plain data, all texts of which are visible."""
+    if isinstance(data, str):
+        return visible_lines(data)
+    if isinstance(data, dict):
+        return {key: _visible(each) for key, each in data.items()}
+    return [_visible(each) for each in data] if isinstance(data, (list, tuple)) else data

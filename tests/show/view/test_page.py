@@ -351,12 +351,12 @@ def test_two_thousand_actors_and_a_million_events_fit_into_a_page(
 
 HOSTILE = """
 model: hostile
-doc: "<script>alert(1)</script></script><img src=x onerror=alert(2)>"
+doc: "<script>alert(1)</script></script><img src=x onerror=alert(2)>\\u202Eback"
 parameters:
   words: {value: "</script><script>alert(3)</script>"}
 actors:
   clock: {type: Clock, period: 0.1}
-  said: {type: Const, value: "<img src=x onerror=alert(4)> ${words}"}
+  said: {type: Const, value: "<img src=x onerror=alert(4)> ${words}\\u202Eback"}
 connections:
   - clock.output -> said.trigger
 aspects:
@@ -374,11 +374,12 @@ def test_what_a_model_says_is_never_part_of_the_page(tmp_path: Path, opened: Ope
     assert "alert" not in path.read_text()
     page = opened(path)
     words = page.words()
-    assert "<script>alert(1)</script></script><img src=x onerror=alert(2)>" in words
+    assert "<script>alert(1)</script></script><img src=x onerror=alert(2)>\\u202eback" in words  # which is not obeyed
     assert "<b onmouseover=alert(5)>bold</b>" in words
     page.do("""
         const {run} = state, firing = run.firing_tag.findIndex((_, i) => run.actorName(i) === "said" && run.hasSent[i]);
         state.goTo({run: 0, firing, record: -1});
     """)
-    assert "<img src=x onerror=alert(4)> </script><script>alert(3)</script>" in page.words()
+    assert "<img src=x onerror=alert(4)> </script><script>alert(3)</script>\\u202eback" in page.words()
+    assert page.do("return state.run.lanes[0].states[0].slice(-10)") == "\\u202eback"
     assert page.tab.locator("img, iframe, .details script").count() == 0
