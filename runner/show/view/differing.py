@@ -35,7 +35,7 @@ class First:
 
     @property
     def tag(self) -> str:
-        return f"({self.time:.9g} s, {self.at.microstep})"
+        return _told(self.at)
 
     @property
     def does(self) -> tuple[str, ...]:
@@ -54,7 +54,7 @@ def difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
         "records": [each.among_kept("record", [record])[0] for each in recordings],
         "texts": [_said(each, record) for each in recordings],
         "firings": [each.among_kept("firing", [n])[0] for each, n in zip(recordings, numbers, strict=True)],
-        "fired": [] if first is None else [f"{first.at} {first.actor} {each}" for each in first.does],
+        "fired": [] if first is None else [f"{first.tag} {first.actor} {each}" for each in first.does],
     }
 
 
@@ -95,7 +95,7 @@ def _said(recording: Recording, record: int) -> str:
     tag, port, event, aspect = (kept.columns[f"record_{each}"][number] for each in ("tag", "port", "event", "aspect"))
     place, name = list(recording.ports)[port]
     by = f" by {list(recording.aspects)[aspect]}" if aspect != NOTHING else ""
-    where = f"{kept.tags[tag]} {list(recording.places)[place]}.{name}"
+    where = f"{_told(kept.tags[tag])} {list(recording.places)[place]}.{name}"
     return f"{where} {list(recording.events)[event]}{by}: {_token(kept, number, _WIDEST)}"
 
 
@@ -117,6 +117,11 @@ def _took(recording: Recording, number: int) -> str:
     woke = ["a wake-up" for _ in rows("wake")]
     sent = [said(columns["record_port"][r], r) for r in rows("record") if columns["record_aspect"][r] == NOTHING]
     return f"takes {', '.join([*took, *woke]) or 'nothing'}; sends {', '.join(sent) or 'nothing'}"
+
+
+def _told(tag: Tag) -> str:
+    """A tag in words, to the nanosecond."""
+    return f"({tag.seconds:.15g} s, {tag.microstep})"
 
 
 def _token(kept: Kept, record: int, widest: int) -> str:

@@ -76,7 +76,7 @@ def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
         "name": name,
         "model": model.name,
         "doc": model.doc,
-        "seed": results.seed,
+        "seed": str(results.seed),  # a browser's numbers have 53 bits
         "end": to_nanoseconds(results.end),
         "stopped": results.stopped,
         "digest": results.digest,

@@ -349,6 +349,26 @@ def test_two_thousand_actors_and_a_million_events_fit_into_a_page(
     assert painted < 60.0  # ms, in a browser without a graphics card
 
 
+FINE = """
+model: fine
+actors: {clock: {type: Clock, period: 1 ns, offset: 100000.000000001 s}}
+run: {stop: 100000.000000004 s, seed: 9223372036854775807}
+"""
+
+
+def test_times_and_seeds_are_shown_to_the_last_digit(tmp_path: Path, opened: Open) -> None:
+    (tmp_path / "fine.yaml").write_text(FINE)
+    (tmp_path / "late.yaml").write_text(FINE.replace("01 s}", "02 s}"))
+    runs = [(str(tmp_path / f"{name}.yaml"), dict[str, str]()) for name in ("fine", "late")]
+    page = opened(written(tmp_path / "page.html", *runs, names=("fine", "late")))
+    words = page.words()
+    assert "seed\t9223372036854775807\nend\t100000.000000004 s, stop time" in words
+    assert "fine\t(100000.000000001 s, 1) clock.output send: 0" in words
+    assert "fine\t(100000.000000001 s, 1) clock takes a wake-up; sends output 0" in words
+    page.do("state.setTag(1)")
+    assert page.words("#now") == "100000.000000002 s"
+
+
 HOSTILE = """
 model: hostile
 doc: "<script>alert(1)</script></script><img src=x onerror=alert(2)>\\u202Eback"

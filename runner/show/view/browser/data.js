@@ -198,7 +198,8 @@ class Run {
   }
 }
 
+// The shortest number that is this time and no other.
 /** @param {number} nanoseconds */
 function secondsText(nanoseconds) {
-  return `${parseFloat((nanoseconds / 1e9).toPrecision(9))} s`;
+  return `${nanoseconds / 1e9} s`;
 }

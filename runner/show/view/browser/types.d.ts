@@ -93,7 +93,7 @@ interface RunHead {
   name: string;
   model: string;
   doc: string;
-  seed: number;
+  seed: string;
   end: number; // ns
   stopped: string;
   digest: string;
