@@ -369,6 +369,32 @@ def test_times_and_seeds_are_shown_to_the_last_digit(tmp_path: Path, opened: Ope
     assert page.words("#now") == "100000.000000002 s"
 
 
+def test_the_words_at_an_axis_differ_and_stand_apart(wifi: Path, opened: Open) -> None:
+    page = opened(wifi)
+    said = page.do("""
+        const { chart } = views, { text } = chart, seen = [];
+        chart.text = (words, x, y, style) => { if (y === 11) seen.push([words, x, chart.paper.measureText(words).width]); };
+        const drawn = () => { seen.length = 0; chart.write(10, false); chart.ruler(); return [...seen]; };
+        state.show(2.4e9, 2.4e9 + 500);
+        const near = drawn();
+        state.show(0, state.end);
+        const whole = drawn();
+        state.setByTag(true);
+        state.show(0, 8);
+        const tags = drawn();
+        chart.text = text;
+        return [[near, whole, tags], chart.width];
+    """)
+    (near, whole, tags), width = said
+    assert [words for words, _, _ in near][:3] == ["2.4 s", "2.4000001 s", "2.4000002 s"]
+    assert whole[-1][0] == "4 s"
+    assert tags[0][0] == "0 s"
+    for words in (near, whole, tags):
+        ends = [start + wide for _, start, wide in words]
+        assert ends[-1] < width
+        assert all(end < start for end, (_, start, _) in zip(ends, words[1:], strict=False))
+
+
 HOSTILE = """
 model: hostile
 doc: "<script>alert(1)</script></script><img src=x onerror=alert(2)>\\u202Eback"

@@ -189,9 +189,13 @@ function ticks(low, high, count) {
   return { step, at: found };
 }
 
-/** @param {number} value */
-function numberText(value) {
-  return Number.isFinite(value) ? String(parseFloat(value.toPrecision(6))) : String(value);
+// A number to six digits, or to as many as tell it from the next one, which is a step away; a whole one as it is.
+/** @param {number} value @param {number} [step] */
+function numberText(value, step) {
+  if (Number.isInteger(value) && Math.abs(value) < 2 ** 24) return String(value); // what 32 bits hold
+  const apart = step ? Math.floor(Math.log10(Math.abs(value))) - Math.floor(Math.log10(step)) + 1 : 0;
+  const [digits, power] = value.toPrecision(Math.min(15, Math.max(6, apart))).split("e");
+  return `${parseFloat(digits)}${power ? `e${power}` : ""}`;
 }
 
 /** @param {string} colour @param {number} share */

@@ -120,11 +120,12 @@ class Space extends View {
     const across = ticks(camera.x - half, camera.x + half, this.width / 90);
     for (const x of across.at) {
       this.line([this.x(x), 0, this.x(x), this.height], theme.faint, 0.5);
-      this.text(numberText(x), this.x(x) + 3, this.height - 4, { size: 10, colour: theme.soft });
+      this.text(numberText(x, across.step), this.x(x) + 3, this.height - 4, { size: 10, colour: theme.soft });
     }
-    for (const y of ticks(camera.y - tall, camera.y + tall, this.height / 90).at) {
+    const up = ticks(camera.y - tall, camera.y + tall, this.height / 90);
+    for (const y of up.at) {
       this.line([0, this.y(y), this.width, this.y(y)], theme.faint, 0.5);
-      this.text(`${numberText(y)} m`, 3, this.y(y) < 14 ? this.y(y) + 11 : this.y(y) - 3, { size: 10, colour: theme.soft });
+      this.text(`${numberText(y, up.step)} m`, 3, this.y(y) < 14 ? this.y(y) + 11 : this.y(y) - 3, { size: 10, colour: theme.soft });
     }
   }
 

@@ -57,12 +57,17 @@ class Timeline extends View {
   ruler() {
     const { axis, run } = this.state, { low, high } = axis;
     const marks = axis.byTag ? ticks(low, high, this.span / 110) : ticks(low / 1e9, high / 1e9, this.span / 90);
+    let free = this.margin; // px from which on nothing is written
     for (const at of marks.at) {
       const x = this.x(axis.byTag ? at : at * 1e9);
       if (x < this.margin) continue;
       this.line([x, 0, x, this.height], theme.faint, 0.5);
-      const words = axis.byTag ? (Number.isInteger(at) && run.times[at] !== undefined ? run.tagText(at) : "") : `${numberText(at)} s`;
-      this.text(words, x + 3, 11, { size: 10, colour: theme.soft });
+      const words = axis.byTag ? (Number.isInteger(at) && run.times[at] !== undefined ? run.tagText(at) : "") : `${numberText(at, marks.step)} s`;
+      this.write(10, false);
+      const wide = this.paper.measureText(words).width, start = Math.min(x + 3, this.width - wide - 3);
+      if (start < free) continue;
+      this.text(words, start, 11, { size: 10, colour: theme.soft, isApart: true });
+      free = start + wide + 8;
     }
     // The firings that a thinned run does not show.
     for (const [kept, count] of run.gaps) {
