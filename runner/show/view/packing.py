@@ -40,9 +40,12 @@ class Pack:
         return self._put("d", np.asarray(numbers, dtype="<f8").ravel())
 
     def rough(self, numbers: Sequence[float] | NDArray[np.float64]) -> Column:
-        """A column of 32-bit numbers, precise enough for a screen."""
-        with np.errstate(over="ignore"):
-            return self._put("f", np.asarray(numbers, dtype=float).astype("<f4").ravel())
+        """A column of 32-bit numbers, precise enough for a screen; of 64 if some are too large or small for that."""
+        values = np.asarray(numbers, dtype=float).ravel()
+        with np.errstate(over="ignore", under="ignore"):
+            found = values.astype("<f4")
+        is_near = np.isclose(found, values, rtol=1e-6, atol=0.0, equal_nan=True)
+        return self._put("f", found) if is_near.all() else self.exact(values)
 
     def texts(self, texts: Iterable[str]) -> tuple[Column, Column]:
         """Texts, with what would be hidden in them: a column of bytes, and one with the length of each."""

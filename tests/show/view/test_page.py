@@ -373,7 +373,8 @@ def test_the_words_at_an_axis_differ_and_stand_apart(wifi: Path, opened: Open) -
     page = opened(wifi)
     said = page.do("""
         const { chart } = views, { text } = chart, seen = [];
-        chart.text = (words, x, y, style) => { if (y === 11) seen.push([words, x, chart.paper.measureText(words).width]); };
+        const wide = (words) => chart.paper.measureText(words).width;
+        chart.text = (words, x, y) => { if (y === 11) seen.push([words, x, wide(words)]); };
         const drawn = () => { seen.length = 0; chart.write(10, false); chart.ruler(); return [...seen]; };
         state.show(2.4e9, 2.4e9 + 500);
         const near = drawn();
@@ -393,6 +394,29 @@ def test_the_words_at_an_axis_differ_and_stand_apart(wifi: Path, opened: Open) -
         ends = [start + wide for _, start, wide in words]
         assert ends[-1] < width
         assert all(end < start for end, (_, start, _) in zip(ends, words[1:], strict=False))
+
+
+NUMBERS = """
+model: numbers
+actors:
+  clock: {type: Clock, period: 1 s}
+  few: {type: Sequence, values: [1234567, 1e300, 1.5e-50, 123456789.0, 0.1]}
+connections: [clock.output -> few.trigger]
+run: {stop: 4 s, record: few.output}
+"""
+
+
+def test_numbers_are_shown_as_the_run_had_them(tmp_path: Path, opened: Open) -> None:
+    (tmp_path / "numbers.yaml").write_text(NUMBERS)
+    page = opened(written(tmp_path / "page.html", (str(tmp_path / "numbers.yaml"), {})))
+    said = page.do("""
+        const { lanes } = views, { text } = lanes, seen = [];
+        lanes.text = (words, x, y, { size }) => { if (size === 11) seen.push(words); };
+        for (let i = 0; i < 5; i++) { state.setTime(i * 1e9); lanes.paint(); }
+        lanes.text = text;
+        return seen;
+    """)
+    assert said == ["1234567", "1e+300", "1.5e-50", "1.23457e+8", "0.1"]
 
 
 HOSTILE = """

@@ -64,7 +64,7 @@ function fieldRow(field, write) {
     slider.step = String(field.whole ? 1 : stepOf(field.high - field.low));
     slider.addEventListener("input", () => {
       slider.dataset.used = "yes";
-      input.value = [numberText(Number(slider.value)), now.unit].filter(Boolean).join(" ");
+      input.value = [now.whole ? slider.value : numberText(Number(slider.value)), now.unit].filter(Boolean).join(" ");
       write(input.value);
     });
     slider.addEventListener("change", () => { slider.dataset.used = ""; });

@@ -30,7 +30,7 @@ interface Mark {
   port: Path;
   shape: "body" | "goal" | "ellipse" | "tube" | "line";
   times: Float64Array; // s
-  rows: Float32Array;
+  rows: Float32Array | Float64Array;
   width: number; // of a row
   interval: number; // s, usual
   radius: number; // m
