@@ -51,13 +51,16 @@ def _line(name: str, times: Floats, values: Floats, asked: dict[str, bool]) -> L
 
 
 def turning_points(times: Floats, values: Floats, parts: int) -> NDArray[np.int64]:
-    """The samples that show the shape of a line: the first, lowest, highest and last in each part of the time."""
+    """The samples that show the shape of a line: the first, lowest, highest and last in each part of the time, and the
+    first that is not finite."""
     span = (times[-1] - times[0]) or 1.0
     starts = np.flatnonzero(np.diff(np.minimum((times - times[0]) / span * parts, parts - 1).astype(int), prepend=-1))
     kept: list[int] = []
     for start, end in zip(starts, [*starts[1:], len(times)], strict=True):
-        some = np.where(np.isnan(values[start:end]), 0.0, values[start:end])
-        places = (0, some.argmin(), some.argmax(), len(some) - 1)
+        some = values[start:end]
+        gaps = np.flatnonzero(~np.isfinite(some))[:1]  # seen, but neither lowest nor highest
+        low, high = (np.where(np.isfinite(some), some, away) for away in (np.inf, -np.inf))
+        places = (0, low.argmin(), high.argmax(), len(some) - 1, *gaps)
         kept += sorted({int(start) + int(place) for place in places})
     return np.array(kept, dtype=np.int64)
 

@@ -29,6 +29,11 @@ def test_what_is_left_of_a_line_keeps_its_extremes() -> None:
         assert values[chosen].min() == values[inside].min()
 
 
+def test_what_is_no_number_hides_no_extreme() -> None:
+    values = np.array([5.0, 9.0, np.inf, 6.0, np.nan, 5.5, 3.0, 4.0])
+    assert turning_points(np.zeros(8), values, 2).tolist() == [0, 1, 2, 6, 7]
+
+
 @pytest.mark.parametrize("values", [[np.nan] * 4, [1.0] * 4, [np.inf, -np.inf, 0.0, np.nan]])
 def test_lines_that_are_none(values: list[float]) -> None:
     assert turning_points(np.zeros(4), np.array(values), 2)[[0, -1]].tolist() == [0, 3]

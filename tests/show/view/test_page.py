@@ -419,6 +419,28 @@ def test_numbers_are_shown_as_the_run_had_them(tmp_path: Path, opened: Open) -> 
     assert said == ["1234567", "1e+300", "1.5e-50", "1.23457e+8", "0.1"]
 
 
+@pytest.mark.parametrize(
+    ("style", "lines"), [("steps", [[0, 0, 1, 0], [2, 1, 3, 1, 3, 2, 4, 2]]), ("line", [[2, 1, 3, 2]])]
+)
+def test_a_line_has_gaps_where_there_is_no_number(
+    style: str, lines: list[list[int]], tmp_path: Path, opened: Open
+) -> None:
+    text = NUMBERS.replace("1234567, 1e300, 1.5e-50, 123456789.0, 0.1", "0, .nan, 1, 2, .inf")
+    (tmp_path / "gaps.yaml").write_text(
+        f"{text}figures: {{f: {{type: TimeSeries, signals: few.output, style: {style}}}}}\n"
+    )
+    page = opened(written(tmp_path / "page.html", (str(tmp_path / "gaps.yaml"), {})))
+    drawn = page.do("""
+        const { lanes } = views, { line } = lanes, [lane] = state.run.lanes, seen = [];
+        lanes.line = (points, colour, width) => { if (width === 1.4 && points.length > 2) seen.push(points); };
+        lanes.numbers([lane], 0);
+        lanes.line = line;
+        const seconds = (x) => Math.round(lanes.at(x) / 1e9), values = (y) => Math.round((41 - y) / 17);
+        return seen.map((points) => points.map((each, i) => i % 2 ? values(each) : seconds(each)));
+    """)
+    assert drawn == lines
+
+
 HOSTILE = """
 model: hostile
 doc: "<script>alert(1)</script></script><img src=x onerror=alert(2)>\\u202Eback"

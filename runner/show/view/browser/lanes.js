@@ -153,15 +153,22 @@ class Lanes extends Timeline {
     lanes.forEach((lane, number) => {
       if (!lane || lane.states) return;
       const run = this.state.runs[number], [from, to] = this.inSight(lane);
+      const isActive = number === this.state.active, colour = PALETTE[isActive ? 0 : 5];
       /** @type {number[]} */
-      const points = [];
+      let points = [];
+      const draw = () => {
+        if (lane.line && points.length === 2) this.dot(points[0], points[1], 1.5, colour); // alone between gaps
+        this.line(points, colour, 1.4, isActive ? [] : [4, 3]);
+        points = [];
+      };
       for (let i = from; i < to; i++) {
         const x = this.sampleX(run, lane.times[i]), value = up(lane.values[i]);
         if (!lane.line && points.length) points.push(x, points.at(-1));
-        points.push(x, value);
+        if (Number.isFinite(value)) points.push(x, value);
+        else draw(); // a gap until the next number
       }
       if (to === lane.times.length && points.length && !lane.line) points.push(this.sampleX(run, run.end / 1e9), points.at(-1));
-      this.line(points, PALETTE[number === this.state.active ? 0 : 5], 1.4, number === this.state.active ? [] : [4, 3]);
+      draw();
     });
     this.paper.restore();
     if (high > low)
