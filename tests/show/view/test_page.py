@@ -122,6 +122,38 @@ def test_time_can_be_scrubbed_stepped_and_played(wifi: Path, opened: Open) -> No
     ]
 
 
+def test_keys_and_screen_readers_get_everywhere(wifi: Path, opened: Open) -> None:
+    page = opened(wifi)
+    keys = page.tab.keyboard
+    steps = page.tab.locator("#page > header .group").first.locator("button")
+    assert steps.evaluate_all("(all) => all.map((each) => each.ariaLabel)") == [
+        "first tag",
+        "previous tag",
+        "play",
+        "next tag",
+    ]
+    for name, live in (("play", "off"), ("pause", "polite")):
+        page.tab.get_by_role("button", name=name, exact=True).click()
+        page.do("")
+        assert page.do("return document.getElementById('now').ariaLive") == live
+    page.tab.locator("canvas[data-view=graph]").focus()
+    keys.press("Home")
+    keys.press("ArrowRight")
+    selected = []
+    for _ in range(2):
+        keys.press("Enter")
+        selected.append(page.words().splitlines()[:2])
+    assert [said for _, said in selected] == [f"fired at {page.words('#now')}"] * 2
+    assert selected[0] != selected[1]
+    page.tab.get_by_role("button", name="later", exact=True).focus()
+    seen = []
+    for _ in range(2):
+        keys.press("Enter")
+        seen.append(page.do("return [document.activeElement.textContent, state.selection.firing]"))
+    assert [name for name, _ in seen] == ["later", "later"]
+    assert seen[0][1] < seen[1][1]
+
+
 def test_composites_open_and_close(wifi: Path, opened: Open) -> None:
     page = opened(wifi)
     seen = page.do("""

@@ -88,11 +88,9 @@ class Views {
     this.holder = element("div", { className: "holder" });
     this.strip = element("div", { className: "scrub" });
     this.time = element("output", { className: "now" });
-    this.play = button("▶", () => this.state.play(!this.state.isPlaying), "play");
-    this.play.setAttribute("aria-label", "play");
+    this.times = timeButtons(() => this.state);
     this.box = element("div", { className: "views" },
-      element("div", { className: "viewbar" }, button("|◀", () => this.state.setTag(0)), button("◀", () => this.state.step(-1)), this.play,
-        button("▶|", () => this.state.step(1)), this.time, this.tabs), this.whatIf.box, this.strip, this.holder);
+      element("div", { className: "viewbar" }, ...this.times.buttons, this.time, this.tabs), this.whatIf.box, this.strip, this.holder);
     this.wanted = "";
     /** @type {{ [name: string]: any } | null} the views of the run, by name */
     this.known = null;
@@ -139,8 +137,8 @@ class Views {
     if (!this.known) return;
     this.scrubber.paint();
     this.known[this.name].paint?.();
-    this.play.textContent = state.isPlaying ? "❚❚" : "▶";
     this.time.textContent = state.nowText;
+    this.times.tell(this.time);
     this.whatIf.tell();
   }
 }

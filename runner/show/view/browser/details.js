@@ -5,14 +5,18 @@ class Details {
   constructor(state, lanes) {
     this.state = state;
     this.lanes = lanes;
-    this.box = element("div", { className: "details" });
+    this.box = element("div", { className: "details", tabIndex: -1 });
+    this.box.setAttribute("aria-live", "polite");
     state.listeners.push(() => this.show());
     this.show();
   }
 
   show() {
-    const { selection } = this.state;
+    const { selection } = this.state, used = this.box.contains(document.activeElement) ? document.activeElement.textContent : null;
     this.box.replaceChildren(...(selection ? this.selected(selection) : this.overview()));
+    if (used === null) return;
+    const same = [...this.box.querySelectorAll("button")].find((each) => each.textContent === used);
+    (same ?? this.box).focus(); // so that keys go on from here
   }
 
   overview() {
@@ -175,9 +179,9 @@ class Details {
   }
 }
 
-/** @param {string} words @param {() => void} act */
-function button(words, act, className = "") {
-  const made = element("button", { type: "button", text: words, className });
+/** @param {string} words @param {() => void} act @param {string} [title] what it does, if words are a sign */
+function button(words, act, className = "", title) {
+  const made = element("button", { type: "button", text: words, className, ...(title && { label: title, title }) });
   made.addEventListener("click", act);
   return made;
 }

@@ -159,6 +159,14 @@ class State {
     for (const listener of this.listeners) listener();
   }
 
+  // Selects the first firing of this tag, or the one after that which is selected.
+  selectNext() {
+    const { run, tag, selection } = this, first = search(run.firing_tag.length, (firing) => run.firing_tag[firing] >= tag);
+    const next = selection && selection.firing >= first ? selection.firing + 1 : first;
+    const firing = run.firing_tag[next] === tag ? next : first;
+    if (run.firing_tag[firing] === tag) this.select({ run: this.active, firing, record: NOTHING });
+  }
+
   /** @param {Chosen} selection */
   goTo(selection) {
     this.isPlaying = false;

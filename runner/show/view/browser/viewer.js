@@ -65,8 +65,7 @@ function eachFrame(act) {
 
 /** @param {State} state @param {Page} data */
 function bar(state, data) {
-  const [first] = data.runs, play = button("▶", () => state.play(!state.isPlaying), "play");
-  play.id = "play";
+  const [first] = data.runs, times = timeButtons(() => state);
   const speed = element("select", { label: "model seconds per second", id: "speed" });
   for (const each of [...new Set([...SPEEDS, state.speed])].sort((a, b) => a - b)) speed.append(element("option", { value: each, text: `×${each}` }));
   speed.value = String(state.speed);
@@ -93,17 +92,32 @@ function bar(state, data) {
   const now = element("output", { id: "now" });
   const box = element("header", {},
     element("strong", { text: data.runs.length > 1 ? first.model : first.name || first.model }), ...runs,
-    element("span", { className: "group" },
-      button("|◀", () => state.setTag(0)), button("◀", () => state.step(-1)), play, button("▶|", () => state.step(1)), speed),
-    now, axis,
+    element("span", { className: "group" }, ...times.buttons, speed), now, axis,
     element("span", { className: "group" }, toggle("back", "what led to it"), toggle("ahead", "what came of it")));
   const tell = () => {
     now.textContent = state.nowText;
-    play.textContent = state.isPlaying ? "❚❚" : "▶";
+    times.tell(now);
     speed.value = String(state.speed);
     axis.value = state.axis.byTag ? "tag" : "time";
   };
   return { box, tell };
+}
+
+// The buttons that move through time; while it plays, screen readers do not say the time that an element shows.
+/** @param {() => State} of */
+function timeButtons(of) {
+  const play = button("▶", () => of().play(!of().isPlaying), "play", "play");
+  const buttons = [
+    button("|◀", () => of().setTag(0), "", "first tag"), button("◀", () => of().step(-1), "", "previous tag"), play,
+    button("▶|", () => of().step(1), "", "next tag"),
+  ];
+  const tell = (/** @type {HTMLElement} */ now) => {
+    const { isPlaying } = of();
+    play.textContent = isPlaying ? "❚❚" : "▶";
+    play.ariaLabel = play.title = isPlaying ? "pause" : "play";
+    now.ariaLive = isPlaying ? "off" : "polite";
+  };
+  return { buttons, tell };
 }
 
 /** @param {State} state @param {Chart} chart */
@@ -169,9 +183,10 @@ function keys(state, options = {}) {
       "[": () => state.show(state.axis.low - size / 4, state.axis.high - size / 4),
       "]": () => state.show(state.axis.low + size / 4, state.axis.high + size / 4),
       t: () => state.setByTag(!state.axis.byTag),
+      Enter: () => state.selectNext(),
       Escape: () => state.select(null),
     };
-    if (!acts[event.key] || (event.key === " " && event.target.matches("button"))) return;
+    if (!acts[event.key] || ([" ", "Enter"].includes(event.key) && event.target.matches("button"))) return;
     event.preventDefault();
     acts[event.key]();
   }, options);
