@@ -26,21 +26,22 @@ def compile_kernels(dimensions: int = 2) -> None:
 
     All take any number of dimensions but the solver, which is compiled for the plane and for space by itself.
     """
-    _prepare("the numeric kernels", functools.partial(_compile_all, dimensions))
+    _prepare("the numeric kernels", functools.partial(_compile_all, dimensions), f"compiled_{dimensions}")
 
 
 @functools.cache
 def compile_tracking() -> None:
     """The same for the kernels of a tracker, which other models do not need."""
     compile_kernels()
-    _prepare("the kernels of the tracker", functools.partial(compile_modules, "association"))
+    _prepare("the kernels of the tracker", functools.partial(compile_modules, "association"), "compiled_tracking")
 
 
 @functools.cache
 def compile_retreats() -> None:
     """The same for the kernels of a main robot that keeps a retreat open, and of its filter."""
     compile_kernels()
-    _prepare("the kernels of the safe robot", functools.partial(compile_modules, "lines_of_sight", "retreat"))
+    work = functools.partial(compile_modules, "lines_of_sight", "retreat")
+    _prepare("the kernels of the safe robot", work, "compiled_retreats")
 
 
 def compile_now() -> None:
@@ -49,12 +50,15 @@ def compile_now() -> None:
     compile_kernels()
 
 
-def _prepare(what: str, work: Callable[[], None]) -> None:
-    """Compile some kernels before time starts, or as soon as Python has run kernels for long enough."""
+def _prepare(what: str, work: Callable[[], None], note: str) -> None:
+    """Compile some kernels before time starts, or as soon as Python has run kernels for long enough; the ``note`` tells
+    later processes that this is done, and that they only load them."""
 
     def compile_them() -> None:
-        with _announced(f"compiling {what} (once, about 20 s) ..."):
+        known = (folder() / note).exists()
+        with _announced(f"loading {what} ..." if known else f"compiling {what} (once, about 20 s) ..."):
             work()
+        mark(note)
 
     if IS_PYTHON:
         return

@@ -6,6 +6,8 @@ import math
 import sys
 import threading
 import time
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -326,9 +328,10 @@ def test_parts_can_be_given_as_mappings() -> None:
 
 @pytest.mark.parametrize(("patience", "said"), [(0.001, [COMPILING]), (60.0, [])])
 def test_compiling_is_announced_only_if_it_takes_long(
-    patience: float, said: list[str], caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    patience: float, said: list[str], caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     caplog.set_level(logging.INFO, "epicycle")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     calls = []
 
     def work(dimensions: int) -> None:
@@ -349,3 +352,27 @@ def test_compiling_is_announced_only_if_it_takes_long(
     while threading.active_count() > before:  # nobody is left who would speak later
         time.sleep(0.001)
     assert caplog.messages == said
+    caplog.clear()
+    warm_up.compile_kernels.__wrapped__()  # in a later process, which may be slow to load them
+    assert caplog.messages == [each.replace("compiling", "loading").replace(" (once, about 20 s)", "") for each in said]
+
+
+@pytest.mark.parametrize(
+    ("ready", "allowed", "at_once"),
+    [(True, True, True), (True, False, True), (False, False, True), (False, True, False)],
+)
+def test_kernels_are_made_ready_before_time_starts_unless_python_runs_them(
+    ready: bool, allowed: bool, at_once: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """What is compiled is loaded at once; else it waits until Python has run kernels for long enough."""
+    calls: list[int] = []
+    ledger = SimpleNamespace(allows=lambda: allowed, prepared=[])
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(warm_up, "LEDGER", ledger)
+    monkeypatch.setattr(warm_up, "IS_READY", ready)
+    monkeypatch.setattr(warm_up, "_compile_all", calls.append)
+    warm_up.compile_kernels.__wrapped__(3)
+    assert (calls, len(ledger.prepared)) == (([3], 0) if at_once else ([], 1))
+    for each in ledger.prepared:
+        each()
+    assert calls == [3]
