@@ -77,6 +77,7 @@ class StateMachine(ModalActor):
     Ptolemy: ``FSMActor``, ``ModalModel``.
     """
 
+    copies_share = (*ModalActor.copies_share, "modes", "transitions", "_conditions", "_comparisons", "_guards")
     is_source: ClassVar[bool] = True
     refinements: Refinements | None = None  # of its modes, if it belongs to a composite
     handed: tuple[str, ...] = ()  # variables that are sent to refinements whenever a mode is entered

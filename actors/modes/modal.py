@@ -29,7 +29,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import fsum
-from typing import Any, Final, TypeVar
+from typing import Any, ClassVar, Final, TypeVar
 
 from ..core import Actor, EpicycleError, OutputPort, Parameter, ParameterError, Tag, Wake, did_you_mean
 from .chart import Chart, Leaving, Rule
@@ -61,7 +61,7 @@ class ModalActor(Actor):
     which the actor is done.  The top of this file defines a reaction.
     """
 
-    copies_share = ("_chart", "_exits")
+    copies_share: ClassVar[tuple[str, ...]] = ("_chart", "_exits")
 
     modes: Any = ()
     initial: Any = None
