@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from epicycle.actors import BodyState, Estimate, Measurement, Plan, Pose
+from epicycle.actors import BodyState, Detections, Estimate, Measurement, Plan, Pose
 from epicycle.runner.execution.results.encoding import canonical
 
 
@@ -22,6 +22,12 @@ def state(**changes: Any) -> BodyState:
 def measurement(**changes: Any) -> Measurement:
     given = {"robot": "a", "observer": [0.0, 1.0], "kind": "relative_position", "value": [2.0, 3.0]}
     return Measurement(**{**given, "along": 0.2, "across": 2.0, "time": 0.5, **changes})
+
+
+def scan(**changes: Any) -> Detections:
+    given = {"robot": "a", "observer": [0.0, 1.0], "kind": "relative_position", "values": [[2.0, 3.0]], "along": 0.2}
+    usual = {"across": 2.0, "probability": 0.9, "clutter": 0.0, "max_range": 30.0, "time": 0.5}
+    return Detections(**{**given, **usual, **changes})
 
 
 def estimate(**changes: Any) -> Estimate:
@@ -80,6 +86,18 @@ def test_what_is_not_finite_cannot_be_used(bad: float) -> None:
         (measurement(kind="range", value=[1.0], along=0.0), False),
         (measurement(kind="range", value=[1.0, 2.0]), False),
         (state(position=[1e308, 1e308], velocity=[1e308, 1e308]), True),  # whose sum is not finite
+        (scan(), True),
+        (scan(along=0.0), False),
+        (scan(across=0.0), False),
+        (scan(kind="range", values=[[2.0]], across=0.0), True),
+        (scan(probability=0.0), True),
+        (scan(probability=-0.1), False),
+        (scan(probability=1.0), True),
+        (scan(probability=1.1), False),
+        (scan(clutter=-0.1), False),
+        (scan(clutter=math.inf), False),
+        (scan(max_range=0.0), False),
+        (scan(max_range=math.inf), False),
         (plan(controls=np.ones((1, 2))), True),
         (plan(controls=np.ones((0, 2))), False),
         (plan(controls=np.ones((3, 1))), False),

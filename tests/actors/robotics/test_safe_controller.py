@@ -129,6 +129,33 @@ def test_without_a_state_it_stops_and_without_a_target_it_plans() -> None:
     assert controller.last("overrides") == 0
 
 
+def test_between_what_is_planned_and_the_last_retreat() -> None:
+    """As much of the plan as leaves a retreat is kept, in quarters; if none does, it is the last retreat."""
+    controller = SafeController("main.controller", objective=ReachGoal())
+    harness = Harness(controller)
+    own, seen = BodyState((30.0, 0.0), (0.0, 0.0), 0.0), Estimate((12.0, 0.0, 0.0, 0.0), 0.1 * np.eye(4), 0.0)
+    harness.fire(0.0, trigger=0, state=own, estimate=seen)
+    problem, _ = controller._problem(own)
+    planned, last, tried = np.array([-4.0, 2.0]), controller._retreat, []
+    assert last is not None
+
+    def best(directions: np.ndarray, *given: object) -> tuple[float, int]:
+        tried.append(given[3])
+        return (2.0 if len(tried) == enough else 1.0), 7
+
+    controller._best, controller._kept = best, lambda *given: 1.0
+    for enough in (1, 2, 3, 4, 5):
+        tried.clear()
+        controller._retreat = last
+        found = controller._safe(0.0, problem, planned)
+        shares = [1.0, 0.75, 0.5, 0.25, 0.0]
+        assert np.array(tried) == pytest.approx(
+            np.array([share * planned + (1.0 - share) * LIMIT * last.direction for share in shares[: min(enough, 4)]])
+        )
+        share = shares[enough - 1]
+        assert found == pytest.approx(share * planned + (1.0 - share) * LIMIT * last.direction)
+
+
 def test_the_estimator_of_a_roaming_target() -> None:
     """It predicts with the model: far ahead, the speed is the target's, in no direction."""
     estimator = IntegratedOUEstimator("e", prior_mean=(5, 5, 1, 1), prior_variance=(1, 1, 9, 9), target_speed=1.5)

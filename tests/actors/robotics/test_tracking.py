@@ -365,6 +365,14 @@ def test_too_many_tracks_at_one_place_are_approximated() -> None:
     assert len(harness.last("tracks").numbers) > 10
 
 
+def test_numbers_of_tracks_that_no_scan_can_bring_back_are_forgotten() -> None:
+    """Or a tracker would need more and more memory: here a body comes and goes every three seconds."""
+    harness = track(*[[scan((10.0 * (tick // 30), 20.0), time=tick / 10)] for tick in range(150)])
+    told = sorted({number for each in numbers(harness) for number in each})
+    assert told == [1, 2, 3, 4, 5]
+    assert list(harness.actor._numbers.values()) == [5]
+
+
 # --- what judges them -----------------------------------------------------------------------------------------------
 
 

@@ -59,6 +59,32 @@ def test_special_values_are_those_of_math(name: str) -> None:
     assert not wrong
 
 
+@pytest.mark.parametrize(
+    ("name", "angle", "value"),
+    [
+        ("cos", 91553.86390724055, 2.260440600708132e-16), ("cos", 229174.47169039503, 3.1615741620973803e-16),
+        ("cos", 245403.9393388399, -1.362519568595878e-14), ("sin", 183107.7278144811, 4.520881201416264e-16),
+        ("cos", 168893.59185331408, 5.209832608140709e-14), ("cos", 390256.4934105581, 1.9688653317865783e-14),
+    ],
+)  # fmt: skip
+def test_near_quarter_turns(name: str, angle: float, value: float) -> None:
+    """There nearly all digits of an angle cancel; with fewer of pi, the last one of these would be another."""
+    assert getattr(elementary, name)(angle) == value
+    with mpmath.workdps(60):
+        assert value == float(getattr(mpmath, name)(mpmath.mpf(angle)))
+
+
+def test_powers_near_the_ends_of_what_floats_can_be() -> None:
+    assert elementary.pow(2.0, 1023.5) == 1.2711610061536464e308
+    assert elementary.pow(2.0, 1023.9999999999998) == 1.7976931348620325e308
+    assert answer(elementary.pow, 2.0, 1024.0) == "OverflowError"
+    assert elementary.pow(2.0, -1074.0) == 5e-324
+    assert elementary.pow(2.0, -1074.9) == 5e-324
+    assert elementary.pow(2.0, -1075.1) == 0.0
+    assert elementary.pow(0.5, 1e18) == 0.0
+    assert answer(elementary.pow, 0.5, -1e18) == "OverflowError"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TRUTH)
 def test_compiled_code_gives_the_same_bits_and_no_exception(name: str) -> None:

@@ -71,6 +71,14 @@ def jpda(missed: np.ndarray, likelihood: np.ndarray, density: float) -> np.ndarr
     return found
 
 
+def test_one_track_and_one_detection_by_hand() -> None:
+    """It exists and was missed, or is the detection, which comes from elsewhere in the other two cases."""
+    exists, caused = definitions.association(np.array([0.2]), np.array([[3.0]]), 0.5, np.array([0.4]))
+    missed, seen, absent = 0.4 * 0.2 * 0.5, 0.4 * 3.0, 0.6 * 0.5
+    assert exists == pytest.approx([(missed + seen) / (missed + seen + absent)])
+    assert caused == pytest.approx(np.array([[missed, seen]]) / (missed + seen))
+
+
 @pytest.mark.parametrize("dimensions", [1, 2])
 def test_the_probability_of_a_gate(dimensions: int) -> None:
     for gate in (1e-6, 0.5, 4.0, 9.0, 16.0, 100.0, 900.0):

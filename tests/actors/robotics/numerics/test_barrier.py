@@ -16,6 +16,20 @@ from tests.actors.robotics.numerics.numerics_parts import (
 horizon, newton, task = (importlib.import_module(PREFIX + name) for name in ("horizon", "newton", "task"))
 
 
+@pytest.mark.parametrize(
+    ("v", "step", "share"),
+    [
+        ((0.0, 0.0), (2.0, 0.0), 0.5),
+        ((-0.5, 0.0), (1.0, 0.0), 1.5),
+        ((-0.5, 0.0), (-1.0, 0.0), 0.5),
+        ((1.0, 0.0), (-1.0, 0.0), 2.0),  # on the sphere, through it
+        ((3.0, 0.0), (-4.0, 0.0), 0.5),  # from outside, the nearer crossing
+    ],
+)
+def test_the_share_of_a_step_to_a_sphere(v: tuple[float, ...], step: tuple[float, ...], share: float) -> None:
+    assert task._share(v, step, 1.0) == pytest.approx(share)
+
+
 def test_an_observer_gains_information(random: np.random.Generator) -> None:
     """The sign of I in eq. (5): a plan must not know less in the end than standing still does."""
     for _ in range(10):

@@ -26,6 +26,15 @@ def kept_and_all(*fields: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     return every[:, 0], every[:, 1], kept[:, 0], kept[:, 1]
 
 
+def test_the_largest_variance_of_a_place(random: np.random.Generator) -> None:
+    """In the plane it is exact, in space a bound."""
+    for d in (2, 3):
+        root = random.normal(size=(d, d))
+        covariance = root @ root.T
+        found, most = constraints._largest(tuple(covariance[np.triu_indices(d)])), np.linalg.eigvalsh(covariance)[-1]
+        assert found == pytest.approx(most) if d == 2 else most <= found <= 1.8 * most
+
+
 @pytest.mark.slow
 def test_a_tube_binds_where_it_has_a_radius(random: np.random.Generator) -> None:
     radius = np.linspace(0.6, 4.2, 10)
