@@ -285,7 +285,7 @@ class _Spells(_Taking):
         if found is None:
             return Outcome(missing="no time passed after the first token" if self._open else "no token came")
         after = to_seconds(self.start)
-        if self._measure.interval is None or self._batches is None:
+        if self._batches is None:
             return Outcome(found, after=after)
         return _with_interval(found, self._batches.batches(end), self._measure, self._count, after)
 
