@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from epicycle.actors import Actor, InputPort, Parameter, declared_parameters
+from epicycle.actors import Actor, Dynamics, InputPort, Parameter, SensorModel, declared_parameters
 from epicycle.runner import ModelError, Simulation, load_composite, load_model
 from epicycle.runner.model.build.model import Model
 from epicycle.runner.model.catalogue.packaged import model_folders
@@ -146,6 +146,40 @@ class Loud(Actor):
     factor = Parameter(float, 1.0, doc="how loud")
     silent = Parameter(float, 0.0, doc="of no use")
     unused = ("silent",)
+
+
+class Stream(Dynamics):
+    """Carries a robot away."""
+
+    water = Parameter(float, 0.0, doc="how fast it flows")
+
+
+class Rate(SensorModel):
+    """A part with a part."""
+
+    dynamics = Parameter(Dynamics, None, doc="how the robot moves")
+
+
+WITHIN = """
+model: m
+parameters: {water: 3}
+actors:
+  clock: {type: Clock, period: 1 s}
+  robot: {type: CircularMotion}
+  target: {type: CircularMotion}
+  sensor: {type: Sensor, model: {type: Rate, dynamics: {type: Stream, inherit: [water]}}}
+connections:
+  - clock.output -> robot.trigger, target.trigger
+  - robot.state -> sensor.robot
+  - target.state -> sensor.target
+run: {stop: 1 s}
+"""
+
+
+def test_values_within_values_inherit_too(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(WITHIN, encoding="utf-8")
+    model = load_model(tmp_path / "m.yaml", types=[Rate, Stream])
+    assert model.graph.actors["sensor"].model.dynamics.water == 3.0
 
 
 def test_inherit_all_leaves_out_what_a_class_does_not_use(tmp_path: Path) -> None:

@@ -148,9 +148,11 @@ class Surroundings:
             }
             return replace(node, entries={key: replace(entries[key], value=each) for key, each in inside.items()})
         cls, said = _variant(known, node), entries.pop("inherit", None)
-        if cls is None or said is None:
+        if cls is None:
             return node
-        inherit = NodeReader(self.problems).texts(said.value, f"{owner.name}: 'inherit' of {name}") or ()
+        inherit: tuple[Text, ...] = ()
+        if said is not None:
+            inherit = NodeReader(self.problems).texts(said.value, f"{owner.name}: 'inherit' of {name}") or ()
         kind = entries.pop("type")
         asked = _Asked(name, cls.__name__, declared_parameters(cls), inherit)
         return replace(node, entries={"type": kind, **self._values(owner, asked, entries, taken)})
