@@ -236,7 +236,8 @@ def _where_it_belongs(cls: type, label: str, name: str, value: object) -> list[s
     declared = declared_parameters(cls)
     bases = {each: other.type for each, other in declared.items() if each != name and isinstance(other.type, type)}
     takers = [each for each, base in bases.items() if issubclass(base, Configurable) and kind in variants(base)]
-    if takers or kind not in variants(Distribution) or declared[name].type not in (int, float, int | float):
+    is_number = declared[name].type in (int, float, int | float) and not declared[name].forms
+    if takers or not is_number or kind not in variants(Distribution):
         return [f"{kind} is a value of {each!r}: {each}: {{type: {kind}, ...}}" for each in takers]
     source = f"{{type: Random, distribution: {{type: {kind}, ...}}}}, which draws for each of its triggers"
     if isinstance(declared_ports(cls).get(name), InputPort):
