@@ -95,6 +95,25 @@ def test_a_parameter_of_its_own_unit_is_not_the_parts(tmp_path: Path) -> None:
     assert (far.source, far.unit, far.bounds(), far.doc) == ("", "km", (None, None, None), "where it begins")
 
 
+def test_a_parameter_of_a_distribution_has_the_unit_of_what_is_drawn(tmp_path: Path) -> None:
+    text = (
+        "model: m\nparameters: {mean: {value: 2 min, above: 0}, shape: 3, spread: 1}\n"
+        "actors:\n"
+        "  s: {type: Server, distribution: {type: Gamma, mean: '${mean}', shape: '${shape}'}}\n"
+        "  r: {type: Random, distribution: {type: Normal, standard_deviation: '${spread}'}}\n"
+        "  c: {type: Clock, period: 1 s}\n"
+        "connections: [c.output -> s.input, c.output -> r.trigger]\n"
+    )
+    model = loaded(tmp_path, text)
+    told = {name: (each.source, each.unit, each.bounds()) for name, each in model.declared.items()}
+    assert told == {
+        "mean": ("Gamma.mean", "s", (None, 0.0, None)),
+        "shape": ("Gamma.shape", "1", (None, 0.0, None)),
+        "spread": ("Normal.standard_deviation", "", (0.0, None, None)),
+    }
+    assert model.graph.actors["s"].distribution.mean == 120.0
+
+
 def test_what_comes_from_outside_wins(tmp_path: Path) -> None:
     model = loaded(tmp_path, SHORT, set={"factor": 5, "pair.times": 6, "gain.factor": 7})
     found = {path: (each.factor, each.times) for path, each in model.graph.actors.items() if hasattr(each, "factor")}

@@ -225,9 +225,11 @@ class Surroundings:
                     takers.setdefault(found[1], []).append((f"{kind}.{name}", known[name]))
                 continue
             item = _item(known[name])
+            whole = item or known[name]
             for each in [node] if item is None else [each.value for each in getattr(node, "entries", {}).values()]:
-                if isinstance(each, MappingNode) and (cls := _variant(item or known[name], each)) is not None:
-                    self._add_takers(cls.__name__, declared_parameters(cls), each.entries, takers)
+                if isinstance(each, MappingNode) and (cls := _variant(whole, each)) is not None:
+                    inner = {key: part.in_unit(whole.unit) for key, part in declared_parameters(cls).items()}
+                    self._add_takers(cls.__name__, inner, each.entries, takers)
 
     def _parameter(self, owner: CompositeText, parameter: ParameterText, takers: Takers) -> ParameterText:
         """A parameter with what is not said of it, by the parts that take it."""
