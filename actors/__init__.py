@@ -64,7 +64,7 @@ __all__ = [
     "did_you_mean", "digits", "elementary", "found_variants", "has_own_ports",
     "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",
     "on_entry", "on_exit", "open_regular", "parse_unit", "part_finders", "paths", "plain", "present",
-    "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "symbolic",
+    "quantity", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "symbolic",
     "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name", "units_like",
     "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
 ]  # fmt: skip

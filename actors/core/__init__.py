@@ -43,7 +43,7 @@ from .tag import (
     to_nanoseconds,
     to_seconds,
 )
-from .units import UnitError, convert, in_si, parse_unit, units_like
+from .units import UnitError, convert, in_si, parse_unit, quantity, units_like
 from .variants import found_variants, part_finders, variants
 
 __all__ = [
@@ -56,7 +56,7 @@ __all__ = [
     "counted_in_si", "cut", "declared_parameters", "declared_ports",
     "did_you_mean", "digits", "elementary", "found_variants", "has_own_ports",
     "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",
-    "open_regular", "parse_unit", "part_finders", "paths", "plain", "present", "random_stream",
+    "open_regular", "parse_unit", "part_finders", "paths", "plain", "present", "quantity", "random_stream",
     "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds",
     "to_seconds", "token_type", "type_name", "units_like", "unknown_parameter", "variants", "visible",
     "visible_character", "visible_lines",

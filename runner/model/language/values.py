@@ -13,7 +13,10 @@ from epicycle.actors import (
     Parameter,
     ParameterError,
     Quantity,
+    UnitError,
     is_too_deep,
+    parse_unit,
+    quantity,
 )
 from epicycle.actors.expression import Budget, BudgetError, ExpressionError, check_names, interpolate, names_in
 
@@ -89,7 +92,7 @@ class Values:
             at = inside(node, node.text, error.offset, part)
             meant = error.faults[0].meant
             fix = Fix(at, meant) if meant and at is not node.position else None
-            self._tell(label, error.message, at, local, *self._unseen(node.value, local), fix=fix)
+            self._tell(label, error.message, at, local, *self._unseen(node.value, local), *bare(node, local), fix=fix)
             if self.budget.is_spent:
                 self.problems.raise_if_any()
             return POISON
@@ -135,7 +138,7 @@ class Values:
         try:
             return convert(value)
         except (FaultError, ValueError) as error:
-            return self.blame(label, error, node, local)
+            return self.blame(label, error, node, local, *bare(node, local))
 
     def value(self, computed: Computed, local: Locals, label: str) -> Any:
         """A value that may be computed."""
@@ -156,9 +159,38 @@ class Values:
             if parameter.of is not None and found is not None:
                 parameter.of.convert(found)
         except Exception as error:  # of a user's class
-            source = (f"declared by {parameter.source}",) if parameter.source else ()
-            return self.blame(label, error, node, local, *source)
+            hints = [f"declared by {parameter.source}"] if parameter.source else []
+            if not parameter.unit and node is parameter.value:
+                hints += _unit_to_declare(parameter.name, getattr(node, "value", None))
+            return self.blame(label, error, node, local, *hints)
         return found
+
+
+def bare(node: Node, local: Locals) -> list[str]:
+    """What to do about texts such as ``3 h`` in a wrong value: they are passed on, and nothing computes with them."""
+    if isinstance(node, MappingNode):
+        return [hint for entry in node.entries.values() for hint in bare(entry.value, local)]
+    if not isinstance(node, Scalar) or not isinstance(node.value, str) or "${" not in node.value:
+        return []
+    try:
+        names = sorted(names_in(node.value))
+    except ExpressionError:
+        return []
+    if len(names) == 1 and node.value == f"${{{names[0]}}}":
+        return []
+    return [hint for name in names for hint in _unit_to_declare(name, local.names.get(name))]
+
+
+def _unit_to_declare(name: str, value: object) -> list[str]:
+    """How to declare a parameter whose value is the text of a number with a unit."""
+    found = quantity(value) if isinstance(value, str) else None
+    if found is None or not found[1]:
+        return []
+    try:
+        parse_unit(found[1])
+    except UnitError:
+        return []
+    return [f"the value of {name} is a text: declare its unit, {name}: {{value: {value}, unit: {found[1]}}}"]
 
 
 def _converted(parameter: ParameterText, value: Any) -> Any:
