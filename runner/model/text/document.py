@@ -135,6 +135,7 @@ _UNPRINTABLE = "[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U0001
 _BEGINNING = 50_000  # characters of a broken text that are read again by the slow parser, in a second at most
 _SCALAR = "scalar"  # the scope of a problem with a value as such: others at its place would be consequences
 _INDEXED = re.compile(r"\w\[(?:\d+|\*)\]")
+_OPENED = re.compile(r"\w\[$")
 _ARROW = re.compile(r"\s*[-=]>")
 _BRACKET = re.compile(r"[\[\]{}]")
 _PROPERTIES = re.compile(r"(?:[&!]\S*[ \t]+)+")
@@ -410,11 +411,12 @@ class _Builder:
         if context is not None and mark is not None and not "".join(self._lines[mark.line :]).strip():
             mark = context  # what is missing at the end of the file is reported where it begins
         position = None if mark is None else self._at(mark.line, mark.column)
-        if position is not None and message.startswith("did not find expected ','") and "${" in position.source:
+        before = "" if position is None else position.source[: position.column]  # where it breaks off
+        if message.startswith("did not find expected ','") and before.endswith("${"):
             hints = ['within { } and [ ], quote an expression: "${...}"']
         elif position is not None and hints and _ARROW.match(position.source, position.column - 1):
             hints = ["write the ports on the left without brackets, or quote the whole connection"]
-        elif position is not None and hints and _INDEXED.search(position.source):
+        elif position is not None and hints and (_INDEXED.search(position.source) or _OPENED.search(before)):
             hints.append('within { } and [ ], quote a text with an index: "a[0].port"')
         if position is not None and message.startswith("found character"):
             character = position.source[position.column - 1 : position.column]
