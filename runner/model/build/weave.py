@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from epicycle.actors import declared_parameters, nearest, paths
 from epicycle.aspects import Aspect
 
+from ...support.shown import listed
 from ..graph.acts import connection_place
 from ..graph.woven import Places, WovenAspect
 from ..language.places import PointcutText
@@ -94,8 +95,15 @@ class Pointcuts(View):
         if found and not fitting:
             where = " or ".join(sorted(self.cls.stands_at))
             other = f"{found[0]} is an {self.graph.direction(found[0])} port"
-            return self.tell(f"{self.kind} attaches to {where} ports, but {other}", pointcut)
+            return self.tell(f"{self.kind} attaches to {where} ports, but {other}", pointcut, *self._across(found[0]))
         return POISON if found is POISON else fitting
+
+    def _across(self, port: str) -> list[str]:
+        """The ports at the other ends of a port's connections, if the aspect can attach to them."""
+        edges = [edge for edge in self.graph.edges if port in (edge.source, edge.destination)]
+        ends = [edge.destination if edge.source == port else edge.source for edge in edges]
+        names = [paths.relative(end, self.scope) for end in ends if self._fits(end)]
+        return [f"it is connected to {listed(names, most=3)}, where it can attach"] if names else []
 
     def _parameters_of(self, pointcut: PointcutText) -> list[str] | Poison | None:
         """The parameters that a pointcut selects; None if it selects ports.
