@@ -252,12 +252,17 @@ class _StudyReader(NodeReader):
         if entries is POISON:
             return None
         said = sound(STUDY.values(self, entries, "the study", node.position))
+        if "until" in entries and "replications" in entries:
+            message = "'until' decides how many replications there are, so 'replications' would do nothing"
+            self.problems.add(message, entries["replications"].key.position, "remove it, or give 'at_most' in 'until'")
         said["dimensions"] = (*said.get("dimensions", ()), *said.get("disturb", ()))
         study = Study(self.path, text, **said)
         before = len(self.problems)
         self.columns(study)
-        if len(self.problems) > before:
-            return study
+        varied = entries["vary"].value if "vary" in entries else None
+        is_whole = not isinstance(varied, Mapping) or len(study.dimensions) >= len(varied.entries)
+        if len(self.problems) > before or not is_whole:
+            return study  # what is asked of it would be reported as not varied
         reader = QuestionReader(self.problems, study.dimensions, study.factors, study.path.parent, self.factors_of)
         return replace(study, questions=reader.questions(entries, self.lender))
 

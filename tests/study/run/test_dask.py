@@ -54,7 +54,8 @@ def without_progress(text: str) -> str:
 @pytest.mark.slow
 def test_table_is_that_of_local_processes(cluster: Cluster, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Runs that are ok, raise, hang, and end their process, batch by batch until the interval is narrow enough."""
-    text = STUDY.replace("[0 m/s, 100 cm/s]", "[0 m/s]") + "until: {metric: place, half_width: 2.2, batch: 5}\n"
+    until = "until: {metric: place, half_width: 2.2, batch: 5}"
+    text = STUDY.replace("[0 m/s, 100 cm/s]", "[0 m/s]").replace("replications: 5", until)
     write(tmp_path, text + "set: {fails: [3], hangs: [5], dies: [7]}\n")
     assert study(tmp_path, "--jobs", 2, "--run-timeout", 1, out="local") == 1
     said = capsys.readouterr()

@@ -97,7 +97,7 @@ def test_table_is_the_same_for_any_number_of_jobs(done: Path, tmp_path: Path) ->
 
 def test_sequential_stopping_is_decided_between_batches(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     until = "until: {metric: place, half_width: 2, batch: 4, at_most: 40}\n"
-    plan = plan_of(write(tmp_path, STUDY + until))
+    plan = plan_of(write(tmp_path, STUDY.replace("replications: 5\n", until)))
     outcome = run_study(plan, tmp_path / "out", jobs=2)
     table = open_study(tmp_path / "out").to_pandas()
     for _, rows in table.groupby("condition"):

@@ -39,16 +39,17 @@ def handed_out(plan: Any, share: Share) -> list[tuple[int, int]]:
     return found
 
 
-@pytest.mark.parametrize("until", ["", "until: {metric: place, half_width: 1, batch: 2, at_most: 7}\n"])
+@pytest.mark.parametrize("rule", ["replications: 5", "until: {metric: place, half_width: 1, batch: 2, at_most: 7}"])
 @pytest.mark.parametrize("of", [1, 2, 3, 5, 7, 40])
-def test_each_run_is_in_one_share(of: int, until: str, tmp_path: Path) -> None:
+def test_each_run_is_in_one_share(of: int, rule: str, tmp_path: Path) -> None:
     levels = "{from: 0, to: 10, step: 1}"
-    plan = plan_of(write(tmp_path, STUDY.replace("[0 m/s, 100 cm/s]", levels) + until))
+    text = STUDY.replace("[0 m/s, 100 cm/s]", levels).replace("replications: 5", rule)
+    plan = plan_of(write(tmp_path, text))
     shares = [Share(number, of) for number in range(of)]
     runs = [handed_out(plan, share) for share in shares]
     assert Counter(run for share in runs for run in share) == Counter(handed_out(plan, Share()))
     assert sum(share.size(plan) for share in shares) == plan.size
-    if not until:
+    if plan.study.until is None:
         assert [len(share) for share in runs] == [share.size(plan) for share in shares]
         assert max(map(len, runs)) - min(map(len, runs)) <= 1 + 5 % of
     else:  # of which the next runs depend on those before
