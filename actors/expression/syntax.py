@@ -58,6 +58,10 @@ _OPERATOR_SIGNS: Final[dict[type[ast.AST], str]] = {
     ast.Invert: "~", ast.Is: "is", ast.IsNot: "is not",
 }  # fmt: skip
 _OPERATOR_HINTS: Final = {"^": " (a power is written **)", "is": " (write ==)", "is not": " (write !=)"}
+_OF_OTHERS: Final = re.compile(
+    r"&&|\|\||\?|!(?!=)|(?<![=!<>])=(?!=)"
+)  # signs of other languages, which end Python's reading
+_OURS: Final = {"&&": "and", "||": "or", "?": "'a if b else c'", "!": "not", "=": "=="}
 
 
 @functools.lru_cache(maxsize=4096)  # a model asks for the same few expressions once per copy of an actor
@@ -77,7 +81,9 @@ def parse(source: str) -> ast.expr:
     except SyntaxError as error:
         offset = max(error.offset or 1, 1) - 1 + indent
         length = max((error.end_offset or 0) - (error.offset or 0), 1)
-        reason = error.msg.replace(" or ':='", "")
+        signs = (each[0] for each in _OF_OTHERS.finditer(code) if each.start() <= offset <= each.end())
+        sign = next(signs, None) if error.msg == "invalid syntax" else None
+        reason = error.msg.replace(" or ':='", "") + (f" (write {_OURS[sign]})" if sign else "")
         message = f"this is not an expression: {reason}"
         raise ExpressionError(message, min(offset, len(source)), length, reason=reason) from None
     except (RecursionError, MemoryError):
