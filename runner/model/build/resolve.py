@@ -30,7 +30,7 @@ from ..graph.model_graph import ModelGraph
 from ..language.models import CompositeText
 from ..language.parts import PartText
 from ..language.settings import Setting, Settings
-from ..language.values import OUTSIDE, Locals, Values, bare
+from ..language.values import OUTSIDE, Locals, Values, advice_on
 from ..text.document import Entry, Scalar
 from ..text.document import Mapping as MappingNode
 from ..text.files import data_file
@@ -139,7 +139,7 @@ class ParameterResolver(Values):
                     declared[name].convert(found[name])
                 except Exception as error:
                     hints = _where_it_belongs(cls, label, name, found[name])
-                    self.blame(f"{label}.{name}", error, entry.value, known, *hints, *bare(entry.value, known))
+                    self.blame(f"{label}.{name}", error, entry.value, known, *hints, *advice_on(entry.value, known))
                     told = True
         if failure is not None and not told:
             written = MappingNode({name: entry for name, (entry, _) in chosen.items()}, position)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Container, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -31,6 +32,7 @@ from .fields import Computed
 from .ports import ParameterText
 
 MAX_STEPS = 500_000
+_SEVERAL = re.compile(r",\s*[A-Za-z_][\w.\[\]*]*=(?!=)")  # a=1,b=2 behind --set
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +94,8 @@ class Values:
             at = inside(node, node.text, error.offset, part)
             meant = error.faults[0].meant
             fix = Fix(at, meant) if meant and at is not node.position else None
-            self._tell(label, error.message, at, local, *self._unseen(node.value, local), *bare(node, local), fix=fix)
+            hints = (*self._unseen(node.value, local), *advice_on(node, local))
+            self._tell(label, error.message, at, local, *hints, fix=fix)
             if self.budget.is_spent:
                 self.problems.raise_if_any()
             return POISON
@@ -138,7 +141,7 @@ class Values:
         try:
             return convert(value)
         except (FaultError, ValueError) as error:
-            return self.blame(label, error, node, local, *bare(node, local))
+            return self.blame(label, error, node, local, *advice_on(node, local))
 
     def value(self, computed: Computed, local: Locals, label: str) -> Any:
         """A value that may be computed."""
@@ -162,14 +165,16 @@ class Values:
             hints = [f"declared by {parameter.source}"] if parameter.source else []
             if not parameter.unit and node is parameter.value:
                 hints += _unit_to_declare(parameter.name, getattr(node, "value", None))
-            return self.blame(label, error, node, local, *hints)
+            return self.blame(label, error, node, local, *hints, *advice_on(node, local))
         return found
 
 
-def bare(node: Node, local: Locals) -> list[str]:
-    """What to do about texts such as ``3 h`` in a wrong value: they are passed on, and nothing computes with them."""
+def advice_on(node: Node, local: Locals) -> list[str]:
+    """What to do about a wrong value: it computes with a text such as ``3 h``, or is several settings in one."""
     if isinstance(node, MappingNode):
-        return [hint for entry in node.entries.values() for hint in bare(entry.value, local)]
+        return [hint for entry in node.entries.values() for hint in advice_on(entry.value, local)]
+    if local.is_outside and isinstance(node, Scalar) and _SEVERAL.search(node.text):
+        return ["if several parameters are meant, give each a --set of its own"]
     if not isinstance(node, Scalar) or not isinstance(node.value, str) or "${" not in node.value:
         return []
     try:
