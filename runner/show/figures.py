@@ -169,6 +169,7 @@ class Histogram(Figure):
 
     def _bins(self, sheet: Sheet, columns: Mapping[str, Floats]) -> None:
         (axes,) = sheet.axes
+        every = sum(map(len, columns.values()))
         columns = {name: values[np.isfinite(values)] for name, values in columns.items()}
         count = sum(map(len, columns.values()))
         if self.log_x:
@@ -176,10 +177,11 @@ class Histogram(Figure):
         ends = [end for values in columns.values() if len(values) for end in (values.min(), values.max())]
         if self.log_x and not ends:
             raise EpicycleError("no value is positive, so the horizontal axis cannot be logarithmic")
-        if self.log_x:
-            edges = np.geomspace(min(ends), max(ends) if max(ends) > min(ends) else 2 * min(ends), self.bins + 1)
-        else:
-            edges = np.histogram_bin_edges(ends or [0.0], self.bins)
+        low, high = min(ends, default=0.0), max(ends, default=0.0)
+        if high - low <= 1e-14 * self.bins * max(abs(low), abs(high)):  # equal but for rounding: no room for bins
+            around = max(0.5, 1e-9 * abs(low))
+            low, high = (low, 2.0 * low) if self.log_x else (low - around, low + around)
+        edges = (np.geomspace if self.log_x else np.linspace)(low, high, self.bins + 1)
         handles, shades = [], colours(len(columns))
         for shade, (name, values) in zip(shades, columns.items(), strict=True):
             shares = np.histogram(values, edges)[0] / max(len(values), 1)
@@ -202,6 +204,7 @@ class Histogram(Figure):
         left_out = count - sum(map(len, columns.values()))
         title = [axes.get_title("left"), *(said if len(said) == 1 else [])]
         title += [f"{left_out:,} values that are not positive are left out"] if left_out else []
+        title += [f"{every - count:,} values that are not finite are left out"] if every > count else []
         axes.set_title(", ".join(title), loc="left")
 
     def _counts(self, sheet: Sheet, states: States) -> None:

@@ -12,13 +12,14 @@ from matplotlib.colors import to_hex
 from PIL import Image
 
 from epicycle.actors import Actor, CircularMotion, Clock, InputPort, OutputPort
-from epicycle.runner import Model, Results, Simulation
+from epicycle.runner import Model, Results, Simulation, load_model
 from epicycle.runner.show import FigureError
 from epicycle.runner.show.canvas import draw, style
 from epicycle.runner.show.figures import Histogram, TimeSeries
 from epicycle.runner.show.sheet import FEW, MAX_TIPS, PALETTE, Sheet, tips_of
 from epicycle.runner.show.trajectories import Trajectories
 
+LEFT = "values that are not {} are left out"
 HOSTILE = '<script>alert(1)</script> & "]]>" \'--> \x1b\u202e'
 
 
@@ -200,3 +201,34 @@ def test_a_histogram_says_what_its_axes_are(tmp_path: Path, sheets: list[Sheet])
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("reading (s)", "share of the values in a bin")
     assert sum(axes.patches[0].get_data().values) == pytest.approx(1.0)
     assert to_hex(axes.patches[0].get_facecolor()) == PALETTE[0]
+
+
+@pytest.mark.parametrize(
+    ("values", "log_x", "said"),
+    [
+        ("[0.3, 0.30000000000000004]", False, "-0.2 to 0.8, mean 0.3"),
+        ("[0.3, 0.30000000000000004]", True, "0.3 to 0.6, mean 0.3"),
+        ("[1e20]", False, "1e+20 to 1e+20, mean 1e+20"),
+        ("[1, .inf, .nan, 3, -1]", True, f"1 to 3, mean 2, 1 {LEFT.format('positive')}, 2 {LEFT.format('finite')}"),
+    ],
+)
+def test_values_that_have_no_place_in_bins(values: str, log_x: bool, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "model: m\nactors:\n  clock: {type: Clock, period: 1 s}\n"
+        f"  few: {{type: Sequence, values: {values}}}\n"
+        "connections: [clock.output -> few.trigger]\nrun: {stop: 4 s, record: few.output}\n"
+    )
+    results = Simulation(load_model(path)).run()
+    seen: list[str] = []
+
+    class Spied(Histogram):
+        def _bins(self, sheet: Sheet, columns: Any) -> None:
+            super()._bins(sheet, columns)
+            (axes,) = sheet.axes
+            seen.append(axes.get_title("left"))
+            seen.append(" to ".join(f"{end:.6g}" for end in axes.patches[0].get_data().edges[[0, -1]]))
+
+    draw("f", Spied(signals="few.output", log_x=log_x), results, tmp_path / "f.svg")
+    title, ends = seen
+    assert f"{ends}, {title.removeprefix('m, seed 0, 4 s, ')}" == said
