@@ -30,8 +30,8 @@ class Lane:
     left_out: int  # samples
 
 
-def lanes(results: Results, figures: Iterable[Figure]) -> list[Lane]:
-    """The lanes of all recorded signals, those of figures first."""
+def lanes(results: Results, figures: Iterable[Figure]) -> tuple[list[Lane], int]:
+    """The lanes of all recorded signals, those of figures first, and how many are too many."""
     asked: dict[str, bool] = {}
     for figure in figures:
         if style := getattr(figure, "style", ""):
@@ -42,7 +42,7 @@ def lanes(results: Results, figures: Iterable[Figure]) -> list[Lane]:
     found += [_strip(name, np.array(times), texts, asked) for name, (times, texts) in states.items()]
     order = {name: place for place, name in enumerate(asked)}
     found.sort(key=lambda lane: order.get(lane.name, len(order)))
-    return found[:MOST]
+    return found[:MOST], max(0, len(found) - MOST)
 
 
 def _line(name: str, times: Floats, values: Floats, asked: dict[str, bool]) -> Lane:

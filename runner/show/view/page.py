@@ -23,6 +23,7 @@ from .lanes import lanes
 from .packing import Pack
 from .recording import Recording
 
+SETTINGS = 40  # that are listed
 # In this order, because each uses the ones before it; a program that arranges them follows.
 PARTS = ("data", "causes", "paint", "state", "space", "graph", "timeline", "lanes", "chart", "details", "viewer")
 
@@ -71,6 +72,8 @@ def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
     figures = recording.figures.values()
     actors = [path for path in model.graph.actors if path not in recording.places]  # that never fired
     places = [*recording.places, *actors]
+    settings = [_setting(model, *each) for each in results.parameters.items()]
+    shown, left_out = lanes(results, figures)
     numbers = {path: number for number, path in enumerate(places)}
     return {
         "name": name,
@@ -80,7 +83,7 @@ def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
         "end": to_nanoseconds(results.end),
         "stopped": results.stopped,
         "digest": results.digest,
-        "settings": [_setting(model, *each) for each in results.parameters.items()][:40],
+        "settings": settings[:SETTINGS] + ([f"and {rest} more"] if (rest := len(settings) - SETTINGS) > 0 else []),
         "metrics": metrics(recording),
         "monitors": [_monitor(recording, name, each) for name, each in results.monitors.items()],
         "firings": recording.firings,
@@ -94,10 +97,8 @@ def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
         "tags": [pack.exact([tag.time for tag in kept.tags]), pack.whole([tag.microstep for tag in kept.tags])],
         "texts": pack.texts(kept.texts),
         "drawing": drawn(model),
-        "lanes": [
-            {**vars(lane), "times": pack.exact(lane.times), "values": pack.rough(lane.values)}
-            for lane in lanes(results, figures)
-        ],
+        "lanes": [{**vars(lane), "times": pack.exact(lane.times), "values": pack.rough(lane.values)} for lane in shown],
+        "lanes_left_out": left_out,
         "marks": [each for figure in figures for each in _marks(recording, results, figure, pack)],
     }
 

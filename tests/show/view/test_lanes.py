@@ -42,7 +42,8 @@ def test_lines_that_are_none(values: list[float]) -> None:
 def test_lanes_of_figures_come_first_and_long_ones_are_thinned() -> None:
     model = load_model("mm1")
     results = Simulation(model).run(until=20_000.0)
-    found = lanes(results, figures_of(model, Problems()).values())
+    found, left_out = lanes(results, figures_of(model, Problems()).values())
+    assert left_out == 0
     size, wait = (next(lane for lane in found if lane.name == name) for name in ("server.size", "wait.output"))
     assert found[0] is size
     assert size.asked
@@ -55,7 +56,7 @@ def test_lanes_of_figures_come_first_and_long_ones_are_thinned() -> None:
 def test_states_are_strips_of_changes() -> None:
     model = load_model("traffic_light")
     results = Simulation(model).run(until=600.0)
-    lane = next(each for each in lanes(results, ()) if each.name == "cars.mode")
+    lane = next(each for each in lanes(results, ())[0] if each.name == "cars.mode")
     assert lane.states is not None
     assert len(set(lane.states)) == len(lane.states) > 1
     assert [lane.states[int(value)] for value in lane.values[:3]] == results[lane.name].tokens[:3]

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from epicycle.runner.model.catalogue.packaged import packaged_models
-from epicycle.runner.show.view import drawing
+from epicycle.runner.show.view import drawing, lanes
+from epicycle.runner.show.view import page as page_module
 
 from .conftest import Opened, written
 
@@ -471,6 +472,30 @@ def test_a_line_has_gaps_where_there_is_no_number(
         return seen.map((points) => points.map((each, i) => i % 2 ? values(each) : seconds(each)));
     """)
     assert drawn == lines
+
+
+LONG = f"long_{'name_' * 20}of_an_actor"
+MUCH = f"""
+model: much
+parameters: {{a: {{value: 1}}, b: {{value: 2}}, c: {{value: 3}}}}
+actors:
+  clock: {{type: Clock, period: 1 s}}
+  {LONG}: {{type: Scale, factor: "${{a + b + c}}"}}
+connections: [clock.output -> {LONG}.input]
+aspects: {{loss: {{type: PacketLoss, probability: 0.5, at: {LONG}.input}}}}
+run: {{stop: 4 s, record: "**"}}
+"""
+
+
+def test_what_a_page_has_no_room_for_is_told(tmp_path: Path, opened: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "much.yaml").write_text(MUCH)
+    monkeypatch.setattr(lanes, "MOST", 1)
+    monkeypatch.setattr(page_module, "SETTINGS", 1)
+    page = opened(written(tmp_path / "page.html", (str(tmp_path / "much.yaml"), {})))
+    words = page.words()
+    assert "settings\ta = 1, and 2 more" in words
+    told = "Not shown: 1 of the recorded signals, for which the page has no lane. Record fewer, or choose them with a figure."
+    assert told in words
 
 
 HOSTILE = """

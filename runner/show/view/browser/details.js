@@ -42,6 +42,8 @@ class Details {
     const thinned = run.lanes.filter((lane) => lane.left_out);
     if (thinned.length)
       parts.push(element("p", { className: "note", text: `${thinned.length} of ${run.lanes.length} signals are thinned: where there are more samples than pixels, the lowest and the highest are shown.` }));
+    if (run.lanes_left_out)
+      parts.push(element("p", { className: "note", text: `Not shown: ${run.lanes_left_out.toLocaleString("en")} of the recorded signals, for which the page has no lane. Record fewer, or choose them with a figure.` }));
     parts.push(element("p", { className: "note", text: "Select an actor, a body, a dot or a cross to see what led to it and what came of it." }));
     return parts;
   }

@@ -107,6 +107,7 @@ interface RunHead {
   ports: Port[];
   events: string[];
   aspects: Path[];
+  lanes_left_out: number;
   drawing: ModelDrawing;
 }
 
