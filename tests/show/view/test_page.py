@@ -498,6 +498,26 @@ def test_what_a_page_has_no_room_for_is_told(tmp_path: Path, opened: Open, monke
     assert told in words
 
 
+def test_names_that_are_cut_keep_their_end_and_badges_stand_above_lit_wires(tmp_path: Path, opened: Open) -> None:
+    (tmp_path / "much.yaml").write_text(MUCH)
+    page = opened(written(tmp_path / "page.html", (str(tmp_path / "much.yaml"), {})))
+    said = page.do("""
+        const { chart, graphs: [graph] } = views, seen = [], { paper } = chart;
+        paper.fillText = (words) => seen.push(words);
+        chart.paint();
+        delete paper.fillText;
+        const order = [];
+        graph.tokens = () => order.push("tokens");
+        graph.badges = () => order.push("badges");
+        graph.paint();
+        return [seen.filter((each) => each.includes("actor")), order];
+    """)
+    assert said[1] == ["tokens", "badges"]
+    ((name,), _) = said
+    assert name.startswith("…")
+    assert LONG.endswith(name[1:])
+
+
 HOSTILE = """
 model: hostile
 doc: "<script>alert(1)</script></script><img src=x onerror=alert(2)>\\u202Eback"

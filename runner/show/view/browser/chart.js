@@ -62,7 +62,7 @@ class Chart extends Timeline {
     const first = Math.max(0, Math.floor((this.scroll - RULER) / ROW)), last = Math.min(shown.length, first + Math.ceil(this.height / ROW) + 2);
     for (let row = first; row < last; row++) {
       this.line([this.margin, this.y(row), this.width, this.y(row)], theme.faint, 1);
-      this.text(fromEnd(run.places[shown[row]], this.width < 500 ? 14 : 26), this.margin - 6, this.y(row) + 4, { size: 11, align: "right", width: this.margin - 10 });
+      this.text(run.places[shown[row]], this.margin - 6, this.y(row) + 4, { size: 11, align: "right", width: this.margin - 10, hasEnd: true });
     }
     paper.beginPath();
     paper.rect(this.margin - 6, RULER - 3, this.width, this.height);
@@ -200,10 +200,4 @@ class Chart extends Timeline {
     if (best) this.state.goTo({ run: this.state.active, ...best });
     else super.pick(x);
   }
-}
-
-// The end of a path, which says more than its start.
-/** @param {Path} path @param {number} letters */
-function fromEnd(path, letters) {
-  return path.length <= letters ? path : `…${path.slice(path.length - letters + 1)}`;
 }

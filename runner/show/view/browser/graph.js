@@ -104,8 +104,8 @@ class Graph extends View {
     for (const box of seen) this.box(paper, box);
     this.wires(paper);
     for (const box of seen) this.labels(box);
-    this.badges(paper);
     this.tokens();
+    this.badges(paper); // over wires that are lit, so that names can be read
     paper.restore();
   }
 

@@ -63,7 +63,7 @@ class View {
   }
 
   /** @param {string} words @param {number} x @param {number} y @param {TextStyle} style */
-  text(words, x, y, { colour = theme.ink, size = 11, align = "left", bold = false, width = Infinity, isApart = false } = {}) {
+  text(words, x, y, { colour = theme.ink, size = 11, align = "left", bold = false, width = Infinity, hasEnd = false, isApart = false } = {}) {
     const { paper } = this;
     this.write(size, bold);
     paper.fillStyle = colour;
@@ -71,8 +71,9 @@ class View {
     paper.textBaseline = "alphabetic";
     if (width < Infinity && paper.measureText(words).width > width) {
       if (width < 12) return;
-      const fits = search(words.length, (count) => paper.measureText(`${words.slice(0, count + 1)}…`).width > width);
-      words = `${words.slice(0, fits)}…`;
+      const letters = [...words], cut = (/** @type {number} */ count) =>
+        hasEnd ? `…${letters.slice(letters.length - count).join("")}` : `${letters.slice(0, count).join("")}…`;
+      words = cut(search(letters.length, (count) => paper.measureText(cut(count + 1)).width > width));
     }
     if (isApart) { // from what is drawn behind it
       Object.assign(paper, { strokeStyle: theme.panel, lineWidth: 4 });

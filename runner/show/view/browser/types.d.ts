@@ -177,6 +177,7 @@ interface TextStyle {
   align?: CanvasTextAlign;
   bold?: boolean;
   width?: number; // px, beyond which it is cut
+  hasEnd?: boolean; // of a path, whose end says more than its start: that is what stays when it is cut
   isApart?: boolean; // from what is below it
 }
 
