@@ -494,8 +494,8 @@ def test_what_a_page_has_no_room_for_is_told(tmp_path: Path, opened: Open, monke
     page = opened(written(tmp_path / "page.html", (str(tmp_path / "much.yaml"), {})))
     words = page.words()
     assert "settings\ta = 1, and 2 more" in words
-    told = "Not shown: 1 of the recorded signals, for which the page has no lane. Record fewer, or choose them with a figure."
-    assert told in words
+    told = "Not shown: 1 of the recorded signals, for which the page has no lane."
+    assert f"{told} Record fewer, or choose them with a figure." in words
 
 
 def test_names_that_are_cut_keep_their_end_and_badges_stand_above_lit_wires(tmp_path: Path, opened: Open) -> None:
@@ -516,6 +516,15 @@ def test_names_that_are_cut_keep_their_end_and_badges_stand_above_lit_wires(tmp_
     ((name,), _) = said
     assert name.startswith("…")
     assert LONG.endswith(name[1:])
+
+
+def test_a_cone_may_be_of_any_size(wifi: Path, opened: Open) -> None:
+    page = opened(wifi)
+    words = page.do("""
+        const back = { size: 3e5, keys: function* () { for (let i = 0; i < 3e5; i++) yield i % 10; } };
+        return details.cone({ back, ahead: new Map(), isCut: false })[1].textContent;
+    """)
+    assert words == "led to it300,000 firings, 0 s to 0 s"
 
 
 HOSTILE = """

@@ -152,8 +152,9 @@ class Details {
   cone(cone) {
     const { state } = this, { run } = state, words = [];
     const since = (/** @type {Map<number, boolean>} */ firings) => {
-      const tags = [...firings.keys()].map((firing) => run.firing_tag[firing]);
-      return `${firings.size.toLocaleString("en")} firings, ${secondsText(run.times[Math.min(...tags)])} to ${secondsText(run.times[Math.max(...tags)])}`;
+      let first = Infinity, last = 0; // firings are in order of their tags
+      for (const firing of firings.keys()) [first, last] = [Math.min(first, firing), Math.max(last, firing)];
+      return `${firings.size.toLocaleString("en")} firings, ${secondsText(run.times[run.firing_tag[first]])} to ${secondsText(run.times[run.firing_tag[last]])}`;
     };
     if (cone.back.size) words.push(["led to it", since(cone.back)]);
     if (cone.ahead.size) words.push(["came of it", since(cone.ahead)]);
