@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from epicycle.actors import EpicycleError
+from epicycle.actors import EpicycleError, abridged
 
 from ...execution.engine import ActorError, Interventions, LoopError
 from ...model.build.figures import figures_of
@@ -19,6 +19,7 @@ from ...study.run_spec import OpenedRun
 from ...support.bars import SOON
 from ...support.files import replace_file
 from ...support.printing import complain
+from ..outcome import MAX_NAME
 from ..watching import watched
 from .page import page_of
 from .recording import MOST, Recording, ViewError
@@ -45,7 +46,8 @@ class Page:
 
     def open(self) -> Path:
         """Open it in the browser; returns the file, which stays until the computer clears its temporary files."""
-        path = self.save(Path(tempfile.mkdtemp(prefix="epicycle-"), f"{self.recordings[0].model.name}.html"))
+        name = abridged(self.recordings[0].model.name, MAX_NAME)
+        path = self.save(Path(tempfile.mkdtemp(prefix="epicycle-"), f"{name}.html"))
         webbrowser.open(path.as_uri())
         return path
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import webbrowser
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from epicycle.runner.execution.engine import Firing, Simulation, Tracer
 from epicycle.runner.model.build.figures import figures_of
 from epicycle.runner.model.build.model import Model
 from epicycle.runner.model.text.problems import Problems
+from epicycle.runner.show.view.pages import Page
 from epicycle.runner.show.view.recording import MISSING, NOTHING, STRETCH, Recording
 
 
@@ -144,3 +146,13 @@ def test_signals_that_figures_show_in_space_are_recorded_for_the_page_alone() ->
     assert {"main.plan", "observer[2].measurement"} <= recording.results.signals.keys()
     assert model.output.recorded == before
     assert "main.plan" not in before
+
+
+def test_a_page_of_a_model_with_a_long_name_opens(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = list[str]()
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    text = f"model: {'m' * 300}\nactors: {{clock: {{type: Clock, period: 1 s}}}}\nrun: {{stop: 1 s}}\n"
+    (tmp_path / "long.yaml").write_text(text)
+    path = Page([recorded(load_model(tmp_path / "long.yaml"))]).open()
+    assert opened == [path.as_uri()]
+    assert path.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
