@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from epicycle.actors import EpicycleError, Parameter, abridged, texts_parameter
+from epicycle.actors import EpicycleError, Parameter, abridged, counted, texts_parameter
 
 from ..execution.results import Results
 from ..model.catalogue.figure import Figure
@@ -86,9 +86,10 @@ class TimeSeries(Figure):
     def _lines(self, sheet: Sheet, axes: Any, names: list[str], lines: Numbers, begin: float, end: float) -> str:
         """Draw the lines of a panel; returns a note on how they are drawn."""
         look = {"steps": {"drawstyle": "steps-post"}, "line": {}, "points": {"linestyle": "none", "marker": "."}}
-        shades, handles, said = colours(len(names)), [], ""
+        shades, handles, said, gaps = colours(len(names)), [], "", 0
         for shade, name in zip(shades, names, strict=True):
             times, values = (np.frombuffer(column) for column in lines[name])
+            gaps += int(np.count_nonzero(~np.isfinite(values)))
             if self.style == "steps":
                 # A value that ends when it starts is not visible; the last value holds until the end of the run.
                 is_last = np.append(times[1:] != times[:-1], True)
@@ -115,7 +116,7 @@ class TimeSeries(Figure):
             sheet.key(axes, names, handles, shades)
         axes.set_ylabel(fill(self.label or _shared(names), _LETTERS))
         set_log(axes, x=False, y=self.log_y)
-        return said
+        return "; ".join(filter(None, (said, f"Gaps: {counted(gaps, 'value')} not finite" if gaps else "")))
 
 
 def _strips(sheet: Sheet, strips: States, begin: float, end: float, over: float) -> None:

@@ -232,3 +232,14 @@ def test_values_that_have_no_place_in_bins(values: str, log_x: bool, said: str, 
     draw("f", Spied(signals="few.output", log_x=log_x), results, tmp_path / "f.svg")
     title, ends = seen
     assert f"{ends}, {title.removeprefix('m, seed 0, 4 s, ')}" == said
+
+
+def test_values_that_are_not_finite_are_gaps_of_which_the_title_tells(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "model: m\nactors:\n  clock: {type: Clock, period: 1 s}\n"
+        "  few: {type: Sequence, values: [1, .nan, 2, .inf, 3]}\n"
+        "connections: [clock.output -> few.trigger]\nrun: {stop: 4 s, record: few.output}\n"
+    )
+    draw("f", TimeSeries(signals="few.output"), Simulation(load_model(path)).run(), tmp_path / "f.svg")
+    assert "<!-- Gaps: 2 values not finite -->" in (tmp_path / "f.svg").read_text()
