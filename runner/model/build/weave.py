@@ -8,7 +8,7 @@ actors in it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from epicycle.actors import declared_parameters, nearest, paths
@@ -19,13 +19,11 @@ from ..graph.acts import connection_place
 from ..graph.woven import Places, WovenAspect
 from ..language.places import PointcutText
 from ..text.kinds import NO_PLACE
-from ..text.patterns import PathIndex, PatternError, in_general
+from ..text.patterns import PatternError, in_general
 from ..text.problems import POISON, Poison, Position
 from .paths import PlaceOf, View, unknown_inputs
 
-Ends = tuple[str, str]
-Found = tuple[PointcutText, list[str] | Poison]  # what a pointcut selects; poison if it rightly selects nothing
-Aimed = dict[str, PointcutText]  # the last pointcut that selects each place, or a composite around it
+Aimed = dict[str, PointcutText]  # the last pointcut that selects each place, or the outermost composite around it
 
 
 @dataclass
@@ -44,49 +42,58 @@ class Pointcuts(View):
 
     def resolve(self, at: Sequence[PointcutText | Poison]) -> tuple[Places, Aimed]:
         """The places, and the last pointcut that selects each; one that selects nothing is a problem."""
-        pointcuts = [each for each in at if each]
-        is_sound, places, aimed = (self._at_ports if self.cls.at_ports else self._at_actors)(pointcuts)
-        if pointcuts and not places.places and is_sound and POISON not in at:
-            only_out = all(pointcut.exclude for pointcut in pointcuts)
+        found = [(each, self._places_of(each)) for each in at if each]
+        included = [(pointcut, chosen) for pointcut, chosen in found if chosen and not pointcut.exclude]
+        left_out = {place for pointcut, chosen in found if chosen and pointcut.exclude for place in chosen.places}
+        connections = {connection_place(*ends): ends for _, chosen in included for ends in chosen.connections}
+        parameters = dict.fromkeys(path for _, chosen in included for path in chosen.parameters)
+        aimed = {place: pointcut for pointcut, chosen in included for place in chosen.places}
+        units: dict[str, str] = {}  # of an actor that several pointcuts select, the outermost composite counts
+        for pointcut, chosen in included:
+            for actor, unit in chosen.actors.items():
+                if len(unit) <= len(units.get(actor, unit)):
+                    units[actor], aimed[actor] = unit, pointcut
+        places = Places(
+            ports=self.ports.in_order({port for _, chosen in included for port in chosen.ports} - left_out),
+            connections=[ends for place, ends in connections.items() if left_out.isdisjoint((place, ends[1]))],
+            actors={each: units[each] for each in self.paths.actors.in_order(units.keys() - left_out)} if units else {},
+            parameters=[path for path in parameters if path not in left_out],
+        )
+        for pointcut, each in found:
+            if each and pointcut.exclude and each.connections and connections.keys().isdisjoint(each.places):
+                hint = "exclude ports from ports and connections from connections: select some, as in '*.out -> b.in'"
+                self.tell(f"'!{pointcut.text}' excludes no selected connection", pointcut, hint)
+        if found and not places.places and POISON not in (*at, *(each for _, each in found)):
+            only_out = all(pointcut.exclude for pointcut, _ in found)
             nowhere = "'at' has only exclusions" if only_out else "'at' excludes everything that it selects"
-            self.tell(nowhere, pointcuts[0], kind=NO_PLACE)
+            self.tell(nowhere, found[0][0], kind=NO_PLACE)
         return places, aimed
 
-    # -- ports, connections and parameters ------------------------------------------------------------------------
+    def _places_of(self, pointcut: PointcutText) -> Places | Poison:
+        """What one pointcut selects; poison if it rightly selects nothing, or what is wrong with it is reported."""
+        chosen: Places | Poison = POISON
+        if not self.cls.at_ports:
+            if units := self._units_of(pointcut):
+                chosen = self._actors_in(units)
+        elif pointcut.ends is not None:
+            if connections := self._connections_of(pointcut):
+                chosen = Places(connections=connections)
+        elif (parameters := self._parameters_of(pointcut)) is None:
+            if (ports := self._ports_of(pointcut)) is not POISON:
+                chosen = Places(ports=ports)
+        elif parameters:
+            chosen = Places(parameters=parameters)
+        return chosen and self._outside(pointcut, chosen)
 
-    def _at_ports(self, pointcuts: Sequence[PointcutText]) -> tuple[bool, Places, Aimed]:
-        """The places at ports, and whether every pointcut has some."""
-        parameters: dict[str, bool] = {}  # whether they are excluded
-        of_ports: list[Found] = []
-        for pointcut in (each for each in pointcuts if each.ends is None):
-            named = self._parameters_of(pointcut)
-            if named is None:
-                ports = self._ports_of(pointcut)
-                of_ports.append((pointcut, ports and self._outside(pointcut, {port: (port,) for port in ports})))
-                continue
-            for path in named or ():
-                parameters[path] = pointcut.exclude or parameters.get(path, False)
-            of_ports.append((pointcut, named and []))
-        chosen = {port for pointcut, found in of_ports if not pointcut.exclude for port in found or ()}
-        left_out = {port for pointcut, found in of_ports if pointcut.exclude for port in found or ()}
-        of_connections, connections = self._connections([each for each in pointcuts if each.ends is not None])
-        found = [*of_ports, *of_connections]
-        places = Places(
-            ports=self.ports.in_order(chosen - left_out),
-            connections=[ends for ends in connections if ends[1] not in left_out],
-            parameters=[path for path, is_left_out in parameters.items() if not is_left_out],
-        )
-        return _is_sound(found), places, _aimed(found)
-
-    def _outside(self, pointcut: PointcutText, places: Mapping[str, tuple[str, ...]]) -> list[str] | Poison:
-        """Of places with their ends, those that are not in the aspect's own composite."""
-        left = [place for place, ends in places.items() if not any(map(self._is_own, ends))]
-        if places and not left and not pointcut.exclude:
-            return self.tell(f"it cannot attach to its own inside, at {next(iter(places))}", pointcut)
+    def _outside(self, pointcut: PointcutText, places: Places) -> Places | Poison:
+        """Those of the places that are not in the aspect's own composite."""
+        left = places.without(self.own) if self.own else places
+        if places.places and not left.places and not pointcut.exclude:
+            first, *_ = (*places.actors.values(), *places.places)
+            return self.tell(f"it cannot attach to its own inside, at {first}", pointcut)
         return left
 
-    def _is_own(self, path: str) -> bool:
-        return bool(self.own) and paths.is_within(path, self.own)
+    # -- ports, connections and parameters ------------------------------------------------------------------------
 
     def _ports_of(self, pointcut: PointcutText) -> list[str] | Poison:
         """The ports that the aspect can attach to, of those that one pointcut selects."""
@@ -229,25 +236,7 @@ class Pointcuts(View):
         near = wanted.text, sorted(known | self.graph.missing_kinds)
         return self.tell(f"there is no {_asked(pointcut)}", wanted, hint, kind=NO_PLACE, near=near)
 
-    def _connections(self, pointcuts: Sequence[PointcutText]) -> tuple[list[Found], list[Ends]]:
-        """The single connections that pointcuts of the form ``a.out -> b.in`` select."""
-        of_each: list[Found] = []
-        chosen: dict[str, Ends] = {}
-        for pointcut in sorted(pointcuts, key=lambda each: each.exclude):
-            ends = self._connections_of(pointcut)
-            places = {connection_place(*each): each for each in ends or ()}
-            found = POISON if ends is POISON else self._outside(pointcut, places)
-            of_each.append((pointcut, found))
-            if not pointcut.exclude:
-                chosen |= {place: places[place] for place in found or ()}
-            elif found and not chosen.keys() & set(found):
-                hint = "exclude ports from ports and connections from connections: select some, as in '*.out -> b.in'"
-                self.tell(f"'!{pointcut.text}' excludes no selected connection", pointcut, hint)
-            else:
-                chosen = {place: each for place, each in chosen.items() if place not in (found or ())}
-        return of_each, list(chosen.values())
-
-    def _connections_of(self, pointcut: PointcutText) -> list[Ends] | Poison:
+    def _connections_of(self, pointcut: PointcutText) -> list[tuple[str, str]] | Poison:
         """The connections that one pointcut selects."""
         if "input" not in self.cls.stands_at:
             return self.tell(f"{self.kind} attaches to output ports, not to connections", pointcut)
@@ -272,30 +261,19 @@ class Pointcuts(View):
 
     # -- actors ---------------------------------------------------------------------------------------------------
 
-    def _at_actors(self, pointcuts: Sequence[PointcutText]) -> tuple[bool, Places, Aimed]:
-        """The actors that the pointcuts select, singly or with a composite around them; and whether each has some."""
+    def _actors_in(self, units: Sequence[str]) -> Places | Poison:
+        """The actors among actors and composites, each with the outermost that holds it; poison if none was made."""
         index, known, actors = self.paths.owners, self.paths.holders, self.paths.actors
-        found: list[Found] = []
-        for pointcut in pointcuts:
-            units = self._units_of(pointcut, index)
-            found.append((pointcut, units and self._outside(pointcut, {unit: (unit,) for unit in units})))
-        by_unit = _aimed(found)
-        spared = {unit for pointcut, units in found if pointcut.exclude for unit in units or ()}
-        # Those that could not be made are no actors.
-        is_whole = all(each in known for unit in by_unit for each in (unit, *index.inside(unit)))
-        chosen = {each for unit in by_unit for each in (unit, *actors.inside(unit)) if each in actors}
-        attached: dict[str, str] = {}
-        for actor in actors.in_order(each for each in chosen if not self._is_own(each)):
-            around = [*reversed(paths.ancestors(actor)), actor]
-            unit = next((path for path in around if path in by_unit), None)
-            if unit is not None and not spared.intersection(around):
-                attached[actor] = unit
-        aimed = {actor: by_unit[unit] for actor, unit in attached.items()}
-        return is_whole and _is_sound(found), Places(actors=attached), aimed
+        found: dict[str, str] = {}
+        for unit in units:
+            for actor in (each for each in (unit, *actors.inside(unit)) if each in actors):
+                found.setdefault(actor, unit)
+        is_whole = all(each in known for unit in units for each in (unit, *index.inside(unit)))
+        return Places(actors=found) if found or is_whole else POISON
 
-    def _units_of(self, pointcut: PointcutText, index: PathIndex) -> list[str] | Poison:
-        """The actors and composites that one pointcut selects."""
-        name, text = self.kind, pointcut.text
+    def _units_of(self, pointcut: PointcutText) -> list[str] | Poison:
+        """The actors and composites that one pointcut selects, outer ones first."""
+        name, text, index = self.kind, pointcut.text, self.paths.owners
         for key, said in (("port", pointcut.port), ("parameter", pointcut.parameter)):
             if said is not None:
                 self.tell(f"{name} attaches to actors, not to their {key}s", said, f"leave {key!r} out")
@@ -334,15 +312,6 @@ class Pointcuts(View):
         for fault in unknown_inputs(woven, self.graph):  # of execution times by input port
             self.tell(fault.message, place_of(fault), *fault.help)
         return woven
-
-
-def _aimed(found: Iterable[Found]) -> Aimed:
-    """The last pointcut that selects each place."""
-    return {place: pointcut for pointcut, places in found if not pointcut.exclude for place in places or ()}
-
-
-def _is_sound(found: Iterable[Found]) -> bool:
-    return all(places is not POISON for _, places in found)
 
 
 def _asked(pointcut: PointcutText) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 from epicycle.actors import counted, paths
 from epicycle.actors.expression import PortFormula
@@ -51,6 +52,16 @@ class Places:
         connections = (connection_place(*ends) for ends in self.connections)
         return [*self.ports, *connections, *self.actors, *self.parameters]
 
+    def without(self, path: str) -> Self:
+        """Those of them that are not in a part of the model."""
+        return replace(
+            self,
+            ports=[port for port in self.ports if not paths.is_within(port, path)],
+            actors={actor: unit for actor, unit in self.actors.items() if not paths.is_within(actor, path)},
+            parameters=[each for each in self.parameters if not paths.is_within(each, path)],
+            connections=[ends for ends in self.connections if not any(paths.is_within(end, path) for end in ends)],
+        )
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WovenAspect(Places):
@@ -74,16 +85,6 @@ class WovenAspect(Places):
     def kind(self) -> str:
         """The name of its type."""
         return type(self.aspect).__name__ if self.model is None else self.model.kind
-
-    def without(self, path: str) -> WovenAspect:
-        """The aspect after the removal of a part of the model that it may have been attached to."""
-        return replace(
-            self,
-            ports=[port for port in self.ports if not paths.is_within(port, path)],
-            actors={actor: unit for actor, unit in self.actors.items() if not paths.is_within(actor, path)},
-            parameters=[each for each in self.parameters if not paths.is_within(each, path)],
-            connections=[ends for ends in self.connections if not any(paths.is_within(end, path) for end in ends)],
-        )
 
     @property
     def looks_at(self) -> list[str]:
