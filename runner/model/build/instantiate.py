@@ -1,6 +1,6 @@
 """The Instantiator: from declarations to a graph with all actors, composites and ports, connected.
 
-Problems are reported and worked around, so that one load reports all of them: a wrong value becomes ``missing``, and
+Problems are reported and worked around, so that one load reports all of them: a wrong value becomes poison, and
 what is computed from it is not checked; a part that cannot be made is a gap in the graph.
 """
 
