@@ -191,8 +191,6 @@ def compare(
     """
     if len(models) < 2:
         raise EpicycleError("a comparison needs at least two variants")
-    if replications < 1:
-        raise EpicycleError(f"replications: {replications} is not a whole number of at least 1")
     first, recipes = next(iter(models.values())), {name: Recipe.of(model) for name, model in models.items()}
     jobs = min(jobs_for(model, jobs, f"variant {name}") for name, model in models.items())
     seeds = range(start := first.output.seed if seed is None else seed, start + replications)

@@ -163,8 +163,6 @@ def jobs_for(model: Model, jobs: int | None, what: str = "") -> int:
     is_named = Recipe.of(model) is not None
     if jobs is None:
         return available_cores() if is_named else 1
-    if jobs < 1:
-        raise EpicycleError(f"jobs: {jobs} is not a whole number of at least 1")
     if jobs > 1 and not is_named:
         raise EpicycleError(
             f"{what or model.name} cannot be made in other processes, which do not know the models and classes of this "

@@ -88,6 +88,8 @@ def _maker(executor: str, scheduler: str | None) -> Callable[[Recorder, int, Cal
     Raises ``EpicycleError`` if what an executor needs is not installed.
     """
     if executor != DASK:
+        if scheduler is not None:
+            raise EpicycleError(f"the scheduler {scheduler} is for the executor {DASK!r}")
         return make_here
     # Imported here, not with this package, which several threads of a Dask worker may import at once: the first to
     # import `parcel` must not find the package waiting for it.

@@ -209,7 +209,7 @@ def test_a_list_names_disturbances() -> None:
         ),
         (
             {"variants": ["none", "wifi_burst"], "replications": 0},
-            "replications: 0 is not a whole number of at least 1",
+            "replications: '0' is not a whole number from 1 to 1e9",
         ),
     ],
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Unpack
 
+from ...support.declare.checked import checked
 from ...support.declare.parameters import argument
 from .changes import Changes
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from ...model.build.model import Model
 
 
+@checked
 def diff(
     before: Annotated[Model | str | Path, argument("a model: a path to a YAML file, or a packaged one", "BEFORE")],
     after: Annotated[Model | str | Path, argument("the model that it is compared with", "AFTER")],

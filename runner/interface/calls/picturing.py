@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from ...support.declare.checked import checked
 from ...support.declare.parameters import option, whole
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from ...show.pictures import Picture
 
 
+@checked
 def draw(
     model: Model | str | Path,
     *,

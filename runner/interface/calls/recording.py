@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+from ...support.declare.checked import checked
 from ...support.declare.parameters import COUNT, argument, option, repeated
 from .changes import TYPES, seed
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from ...recorded.passing import Disturbed
 
 
+@checked
 def fit(
     trace: Annotated[str | Path, argument("a .csv or .parquet file with a row for each message", "TRACE")],
     *,
@@ -64,6 +66,7 @@ def fit(
     return Fit.of(file.file, file.read(), at)
 
 
+@checked
 def disturb(
     recording: Annotated[str | Path, argument("an .mcap file, or a .csv file: time, topic, value", "RECORDING")],
     disturbance: Annotated[

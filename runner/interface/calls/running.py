@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from ...support.declare.checked import checked
 from ...support.declare.parameters import COUNT, argument, number, option
 from .changes import SEED, UNTIL, Changes, classes
 
@@ -34,6 +35,7 @@ def factor(text: str) -> float:
     return found
 
 
+@checked
 def load(
     model: Annotated[str | Path, argument("a path to a YAML file, or the name of a packaged model", "MODEL")],
     *,
@@ -85,6 +87,7 @@ def opened(
     return OpenedRun(made, seed, seconds("until", until))
 
 
+@checked
 def run(
     model: Annotated[Model | str | Path, argument(REFERENCE, "MODEL or RESULTS")],
     *,
@@ -139,6 +142,7 @@ def run(
     return done.results
 
 
+@checked
 def view(
     *models: Annotated[Model | str | Path, argument(f"one or two of: {REFERENCE}", "MODEL or RESULTS", "+")],
     seed: Annotated[int | None, SEED] = None,

@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack, overload
 
-from ...search.spec import Break, Goal, Match, Minimise, results_folder
+from ...search.spec import GOALS, Break, Goal, Match, Minimise, results_folder
+from ...support.declare.checked import as_declared, checked
 from ...support.declare.parameters import COUNT, argument, option, repeated
 from .changes import (
     ASPECTS,
@@ -85,6 +86,7 @@ def search(model: str | Path, goal: Break, **given: Unpack[SearchOptions]) -> Fa
 def search(model: str | Path, goal: Minimise, **given: Unpack[SearchOptions]) -> Optimum: ...
 @overload
 def search(model: str | Path, goal: Match, **given: Unpack[SearchOptions]) -> Calibration: ...
+@checked
 def search(
     model: Annotated[str | Path, MODEL_OR_STUDY], goal: Goal, **given: Unpack[SearchOptions]
 ) -> Falsification | Optimum | Calibration:
@@ -118,6 +120,9 @@ def search(
 
     if unknown := given.keys() - SearchOptions.__annotations__.keys():
         raise TypeError(f"search() got an unexpected keyword argument {min(unknown)!r}")
+    if not isinstance(goal, GOALS):
+        raise EpicycleError(f"goal: {goal!r} is none of {', '.join(each.__name__ for each in GOALS)}")
+    goal = replace(goal, **as_declared(type(goal), vars(goal)))
     types: Iterable[Any] = given.get("types", ())
     if classes := [each.__name__ for each in types if isinstance(each, type)]:
         raise EpicycleError(
@@ -141,6 +146,7 @@ def search(
         return calibrate(spec, goal, folder, jobs=jobs, show=show)
 
 
+@checked
 def explain(
     model: Annotated[Model | str | Path, argument(REFERENCE, "MODEL or RESULTS")],
     monitor: Annotated[
@@ -174,15 +180,12 @@ def explain(
 
     >>> epicycle.explain("collision_avoidance", "always clearance.distance >= 4 m", seed=3, set={"disturbance": 0.5})
     """
-    from epicycle.actors import EpicycleError
 
     from ...search.explaining import explain as search
     from ...search.monitored import monitors_named
     from ...study.run_spec import spec_of
     from ...support.bars import bar, telling
 
-    if runs < 1:
-        raise EpicycleError(f"runs: {runs} is not a whole number of at least 1")
     found = opened(model, seed, until, changes)
     made, seed = copy.copy(found.model), found.model.output.seed if found.seed is None else found.seed
     spec = spec_of(made, seed, found.until)
@@ -208,6 +211,7 @@ def explain(
     return answer
 
 
+@checked
 def rare(
     model: Annotated[Model | str | Path, argument(REFERENCE, "MODEL or RESULTS")],
     monitor: Annotated[

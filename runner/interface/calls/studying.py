@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+from ...support.declare.checked import checked
 from ...support.declare.parameters import COUNT, argument, option, repeated
 from .changes import JOBS, RUN_TIMEOUT, SEED, TYPES, UNTIL, first_seed
 
@@ -29,6 +30,7 @@ def address(text: str) -> str:
     return f"{found[1] or 'tcp://'}{found[2]}:{found[3]}"
 
 
+@checked
 def study(
     study: Annotated[
         str | Path | Mapping[str, object],
@@ -136,7 +138,12 @@ def plan_of(
     files, settings = [Path(each) for each in types], as_settings(set)
     if isinstance(study, Mapping):
         said = {key: str(value) if isinstance(value, Path) else value for key, value in study.items()}
-        text = yaml.safe_dump(plain(node_of(said, call_site())), sort_keys=False, allow_unicode=True)
+        try:
+            text = yaml.safe_dump(plain(node_of(said, call_site())), sort_keys=False, allow_unicode=True)
+        except yaml.representer.RepresenterError as error:
+            raise EpicycleError(
+                f"a study is made of numbers, texts, lists and mappings, not of {error.args[1]!r}"
+            ) from None
         found = study_of_text(text, PROGRAM, settings, files, replications, seed)
     elif (folder := Path(study)).is_dir() and str(study) not in packaged_studies():
         given = {"--set": settings, "--replications": replications, "--seed": seed, "--out": out}
@@ -154,6 +161,7 @@ def plan_of(
     return plan, results_folder(plan.study.name) if out is None else Path(out)
 
 
+@checked
 def compare(
     model: Annotated[Model | str | Path, argument("a path to a YAML file, or the name of a packaged model", "MODEL")],
     variants: Mapping[str, Model | Changes] | Sequence[str],

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Unpack
 
+from ...support.declare.checked import checked
 from ...support.declare.parameters import argument, option, repeated
 from .changes import SEED, UNTIL, Changes
 from .running import REFERENCE, opened
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from ...search.what_if import WhatIf
 
 
+@checked
 def what_if(
     model: Annotated[Model | str | Path, argument(REFERENCE, "MODEL or RESULTS")],
     at: Annotated[
