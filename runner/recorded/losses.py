@@ -91,13 +91,17 @@ def loss_models(lost: NDArray[np.bool_]) -> list[LossModel]:
 
 
 def gilbert(losses: Losses) -> Channel:
-    """The channel that loses everything while it is bad, and nothing while it is good, by counting its changes."""
+    """The channel that loses everything while it is bad, and nothing while it is good, by counting its changes.
+
+    A change that was never seen counts as one that comes right after the last message: without it, a trace that begins
+    or ends in the other state would be impossible.
+    """
     before, after = losses[:-1], losses[1:]
     bad = int(np.count_nonzero(before))
     worse = int(np.count_nonzero(after & (1 - before)))
     better = int(np.count_nonzero(before & (1 - after)))
     good = len(before) - bad
-    return Channel(worse / good if good else 1.0, better / bad if bad else 1.0)
+    return Channel(worse / good if worse else 1.0 / (good + 1), better / bad if better else 1.0 / (bad + 1))
 
 
 def gilbert_elliott(losses: Losses) -> Channel:

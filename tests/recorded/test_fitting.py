@@ -101,6 +101,15 @@ def test_the_likelihood_is_that_of_the_definition() -> None:
     assert log_likelihood(losses, Channel(0.0, 1.0)) == -math.inf  # impossible
 
 
+@pytest.mark.parametrize("lost", [[1, 0, 0, 0, 0, 0], [0, 0, 0, 1, 1, 1], [1, 1, 0], [0, 1]])
+def test_bursts_are_possible_where_only_one_kind_of_change_is_seen(lost: list[int]) -> None:
+    """Otherwise, whatever is compared with them were certainly better."""
+    independent, bursts, hidden = loss_models(np.array(lost, bool))
+    assert all(math.isfinite(each.log_likelihood) for each in (independent, bursts, hidden))
+    assert hidden.gain is not None
+    assert hidden.gain.p > 0.05
+
+
 def test_runs_at_the_ends_are_cut_off() -> None:
     lost, kept = runs(np.array([1, 1, 0, 0, 0, 1, 0, 1, 1, 0], np.uint8))
     assert (lost.tolist(), kept.tolist()) == ([1, 2], [3, 1])
