@@ -30,7 +30,7 @@ from .growing import Growing, study_of
 from .monitored import AD_HOC, monitors_named, property_of, with_monitors
 from .proposals import BATCH, SPREAD, Point
 from .space import FaultSpace, Interval, SearchSpec, Space, as_set, read_space, text_of
-from .spec import MAX_RUNS, Break, results_folder
+from .spec import Break, results_folder
 
 FILE = Path("falsify")  # what the study of a search has for a file, so that paths are relative to the working directory
 MAX_POINTS = 150_000  # numbers in the text of a study, which is read with limits
@@ -295,8 +295,6 @@ class _Searching:
 
     def __init__(self, spec: SearchSpec, goal: Break) -> None:
         self._spec, self._goal, self._seed = spec, goal, spec.seed or 0
-        if not 0 < goal.runs <= MAX_RUNS:
-            raise EpicycleError(f"runs {goal.runs:,}: expected a whole number from 1 to {MAX_RUNS:,}")
         model = spec.load()
         names = monitors_named(model, goal.monitor or None, flag="--break" if spec.continued_by else "")
         monitors = {name: property_of(model, name) for name in names}
