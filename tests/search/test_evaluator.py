@@ -177,7 +177,7 @@ def test_other_processes_make_no_runs_of_a_model_that_has_changed_since(tmp_path
     assert str(error.value) == (
         f"{path} changed while runs were made, and the next ones would be of another model\n"
         "   help: finished runs are kept; undo the change and repeat the command to continue them, or repeat it with "
-        "the change to make all runs anew"
+        "the change to make all runs again"
     )
 
 

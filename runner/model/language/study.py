@@ -252,7 +252,7 @@ class _StudyReader(NodeReader):
         if entries is POISON:
             return None
         said = sound(STUDY.values(self, entries, "the study", node.position))
-        if "until" in entries and "replications" in entries:
+        if self.asks_for_files and "until" in entries and "replications" in entries:  # runs of earlier versions stay
             message = "'until' decides how many replications there are, so 'replications' would do nothing"
             self.problems.add(message, entries["replications"].key.position, "remove it, or give 'at_most' in 'until'")
         said["dimensions"] = (*said.get("dimensions", ()), *said.get("disturb", ()))

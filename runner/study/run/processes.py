@@ -31,7 +31,7 @@ def check_same(before: Mapping[str, str], now: Mapping[str, str]) -> None:
         raise WorkerError(
             f"{', '.join(changed)} changed while runs were made, and the next ones would be of another model\n"
             "   help: finished runs are kept; undo the change and repeat the command to continue them, or repeat it "
-            "with the change to make all runs anew"
+            "with the change to make all runs again"
         )
 
 

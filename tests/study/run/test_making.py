@@ -73,7 +73,7 @@ def test_runs_of_a_model_that_has_changed_since_are_not_made(text: str | None, t
     assert str(error.value) == (
         f"{model} changed while runs were made, and the next ones would be of another model\n"
         "   help: finished runs are kept; undo the change and repeat the command to continue them, or repeat it with "
-        "the change to make all runs anew"
+        "the change to make all runs again"
     )
     assert open_study(tmp_path / "out").counts() == {}
     write(tmp_path)
@@ -108,6 +108,10 @@ def test_sequential_stopping_is_decided_between_batches(tmp_path: Path, capsys: 
     assert main(["status", str(tmp_path / "out")]) == 0
     assert capsys.readouterr().out == f"walks: {len(table)} of at most 80 runs are finished ({len(table)} ok)\n"
     assert run_study(plan, tmp_path / "out", jobs=1).made == 0
+    # An earlier version took both; what it has made can be opened.
+    manifest = tmp_path / "out" / "manifest.json"
+    manifest.write_text(manifest.read_text("utf-8").replace("until: {", "replications: 5\\nuntil: {"), "utf-8")
+    assert main(["status", str(tmp_path / "out")]) == 0
 
 
 def _width(values: Any) -> float:
