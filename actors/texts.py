@@ -27,6 +27,8 @@ _TYPES: Final[dict[str, Any]] = {
     **dict.fromkeys(("find", "find last"), int),
     "split": list,
 }
+_CUTTING: Final = ("replace", "replace first", "split")
+_COMPARING: Final = tuple(name for name in _TYPES if name not in _CUTTING)
 
 
 class TextFunction(Actor):
@@ -58,7 +60,11 @@ class TextFunction(Actor):
         for values in self._latest.rounds():
             text, other, new = map(self._checked, values.values())
             if self.ignore_case:
-                text, other = text.lower(), other.lower()
+                other = _folded(other)
+                if self.function in _COMPARING:
+                    text = _folded(text)
+                elif self.function in _CUTTING and other:
+                    text = _respelled(text, other)
             if self.function.startswith("replace") and other and text.count(other) * len(new) > MAX_TEXT:
                 raise EpicycleError(f"the result is longer than {counted(MAX_TEXT, 'character')}")
             self.output.send(FUNCTIONS[self.function](text, other, new))
@@ -69,3 +75,17 @@ class TextFunction(Actor):
         if len(token) > MAX_TEXT:
             raise EpicycleError(f"the text is longer than {counted(MAX_TEXT, 'character')}")
         return token
+
+
+def _folded(text: str) -> str:
+    """A text in lower case, of the same length: the lower case of a few letters is longer, and they stay."""
+    return "".join(low if len(low := letter.lower()) == 1 else letter for letter in text)
+
+
+def _respelled(text: str, folded: str) -> str:
+    """A text in which another is spelled as here wherever it occurs; all else keeps its case."""
+    parts, end = [], 0
+    for part in _folded(text).split(folded):
+        parts.append(text[end : end + len(part)])
+        end += len(part) + len(folded)
+    return folded.join(parts)

@@ -162,6 +162,12 @@ def test_a_trigger_that_comes_microsteps_after_the_tick(late: bool, expected: li
         ("TextFunction, function: contains, other: b", [("text", [[0, "abc"], [1, "B"]]), ("other", [[2, "B"]])],
          [True, False, True]),
         ("TextFunction, function: equals, other: b, ignore_case: true", [("text", [[0, "B"]])], [True]),
+        # What is found is found in any case, and what is around it keeps its own.
+        ("TextFunction, function: replace, other: LO, new: x, ignore_case: true", [("text", [[0, "HeLlo, World"]])],
+         ["HeLx, World"]),
+        ("TextFunction, function: split, other: X, ignore_case: true", [("text", [[0, "AxBXC"]])], [["A", "B", "C"]]),
+        ("TextFunction, function: trim, ignore_case: true", [("text", [[0, " A "]])], ["A"]),
+        ("TextFunction, function: find, other: b, ignore_case: true", [("text", [[0, "\u0130B"]])], [1]),
         ("TextFunction, function: replace, other: a, new: xy", [("text", [[0, "aba"]])], ["xybxy"]),
         ("TextFunction, function: replace first, other: a, new: xy", [("text", [[0, "aba"]])], ["xyba"]),
         ("TextFunction, function: find", [("text", [[0, "abc"]]), ("other", [[0, "c"], [1, "x"]])], [2, -1]),
