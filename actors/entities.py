@@ -7,6 +7,8 @@ from collections import deque
 from collections.abc import Hashable, Mapping
 from typing import Any
 
+import numpy as np
+
 from .core import (
     Actor,
     EpicycleError,
@@ -227,6 +229,8 @@ class Unbatch(Actor):
 
 def _items(token: Any) -> Any:
     """A token that is a list, with its items unchanged; raises ``EpicycleError`` if it is not one."""
+    if isinstance(token, np.ndarray) and token.ndim == 1:
+        return token.tolist()  # plain numbers, and not those of NumPy
     if isinstance(seen := operand(token), list):
         return token
     raise EpicycleError(f"{brief(seen)} is not a list")

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.execution.engine import ActorError
+from epicycle.runner.execution.engine import ActorError, Simulation
+from tests.actors.feeding import load
 from tests.actors.library_parts import Feeds, behave, problem, tokens
 
 
@@ -89,3 +90,26 @@ def test_what_cannot_be(actor: str, feeds: Feeds, message: str) -> None:
 def test_records_without_fields() -> None:
     assert problem("{type: RecordAssembler, fields: []}") == "it: fields: the list is empty; name at least one field"
     assert problem("{type: RecordDisassembler, fields: [a, a]}") == "it: fields: 'a' is listed twice"
+
+
+def test_items_of_arrays_are_plain_numbers() -> None:
+    text = """
+model: m
+actors:
+  clock: {type: Clock, period: 1 s}
+  state: {type: StateSpace, a: [[0, 1], [0, 0]], b: [[0], [0]], initial: [0, 1]}
+  items: {type: Unbatch}
+  channels: {type: Spread}
+  first: {type: Recorder}
+  second: {type: Recorder}
+connections:
+  - clock.output -> state.input, state.trigger
+  - state.output -> items.input, channels.input
+  - items.output -> first.input
+  - channels.output -> second.input
+run: {stop: 0 s}
+"""
+    simulation = Simulation(load(text))
+    simulation.run()
+    found = [*simulation["first"].tokens, *simulation["second"].tokens]  # type: ignore[attr-defined]
+    assert [(type(each), each) for each in found] == [(float, 0.0), (float, 1.0), (float, 0.0)]
