@@ -180,7 +180,8 @@ class Drift(Alteration):
 class Transform(Alteration):
     """Replaces each number by an expression over it, the time and the latest tokens of ports.
 
-    NaN is not changed, nor is any number until all the ports have sent a token.
+    NaN is not changed, nor is any number until all the ports have sent a token.  What replaces a whole number is
+    rounded to one, as in all aspects that alter numbers.
     """
 
     to = PortFormulaParameter(

@@ -162,8 +162,6 @@ def test_a_model_that_only_this_program_knows(tmp_path: Path) -> None:
         "mm1 cannot be made in other processes, which do not know the models and classes of this program\n"
         "   help: leave out jobs"
     )
-    with pytest.raises(EpicycleError, match=r"^jobs: 0 is not a whole number of at least 1$"):
-        jobs_for(model, 0)
 
 
 def test_other_processes_make_no_runs_of_a_model_that_has_changed_since(tmp_path: Path) -> None:
