@@ -22,7 +22,7 @@ from ..inference import LEVEL, Estimate, mean, paired_difference, resampled_sums
 from .samples import Levels, Place, Samples, has_enough
 
 RESAMPLES = 9_999
-_TELLING = 2.0**42  # parts of a cost by which two can be told apart
+_TELLING = math.ldexp(1.0, 42)  # parts of a cost by which two can be told apart
 
 
 @dataclass(frozen=True)
