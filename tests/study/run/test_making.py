@@ -109,6 +109,7 @@ def test_sequential_stopping_is_decided_between_batches(tmp_path: Path, capsys: 
     assert capsys.readouterr().out == f"walks: {len(table)} of at most 80 runs are finished ({len(table)} ok)\n"
     assert run_study(plan, tmp_path / "out", jobs=1).made == 0
 
+
 def _width(values: Any) -> float:
     return float(stats.t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values)))
 
