@@ -7,10 +7,9 @@ from epicycle.actors.core.tag cimport Wake
 @cython.final
 cdef class ReadyQueue:
     cdef long long* items
-    cdef readonly Py_ssize_t size
-    cdef Py_ssize_t room
+    cdef Py_ssize_t size, room
     cdef int push(self, long long rank) except -1
-    cdef long long pop(self) except? -1
+    cdef long long pop(self) noexcept
 
 
 cdef struct Item:
@@ -24,12 +23,11 @@ cdef class TimedQueue:
     cdef list wakes, values
     cdef Item* heap
     cdef Py_ssize_t* free
-    cdef readonly Py_ssize_t size
-    cdef Py_ssize_t room, unused
+    cdef Py_ssize_t size, room, unused
     cdef public long long number
     cdef long long first(self) noexcept
     cpdef push(self, Wake wake, value)
-    cdef int put(self, long long time, long microstep, Wake wake, value) except -1
+    cdef Py_ssize_t put(self, long long time, long microstep, Wake wake, value) except -1
     cdef bint is_before(self, long long time, long microstep) noexcept
     cpdef bint is_due(self) except -1
     cpdef pop(self)

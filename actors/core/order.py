@@ -5,6 +5,8 @@ Compiled (``order.pyx``) if a compiler was available.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Any
 
@@ -15,25 +17,17 @@ NEVER = 2**63 - 1  # ns
 
 
 class ReadyQueue:
-    """Whole numbers, the smallest first."""
+    """Whole numbers from 0, the smallest first."""
 
-    __slots__ = ("content",)
+    __slots__ = ("content", "push")
 
     def __init__(self) -> None:
         self.content: list[int] = []
-
-    @property
-    def size(self) -> int:
-        """The number of entries."""
-        return len(self.content)
-
-    def push(self, rank: int) -> None:
-        """Add an entry."""
-        heappush(self.content, rank)
+        self.push: Callable[[int], None] = partial(heappush, self.content)  # add an entry
 
     def pop(self) -> int:
-        """Remove the smallest one."""
-        return heappop(self.content)
+        """Remove the smallest one; -1 if there is none."""
+        return heappop(self.content) if self.content else -1
 
 
 class TimedQueue:
@@ -49,23 +43,20 @@ class TimedQueue:
     def __len__(self) -> int:
         return len(self.content)
 
-    @property
-    def size(self) -> int:
-        """The number of entries."""
-        return len(self.content)
-
     def first(self) -> int:
         """The time of the first; ``NEVER`` if there is none."""
         return self.content[0][0] if self.content else NEVER
 
-    def put(self, time: int, microstep: int, wake: Wake | None, value: Any) -> None:
-        """Add an entry."""
+    def put(self, time: int, microstep: int, wake: Wake | None, value: Any) -> int:
+        """Add an entry; returns how many there are."""
         heappush(self.content, (time, microstep, self.number, wake, value))
         self.number += 1
+        return len(self.content)
 
     def push(self, wake: Wake, value: Any) -> None:
         """Add an entry that waits for a wake-up."""
-        self.put(wake.time, wake.microstep, wake, value)
+        heappush(self.content, (wake.time, wake.microstep, self.number, wake, value))
+        self.number += 1
 
     def is_due(self) -> bool:
         """Whether the wake-up of the first is due."""
@@ -77,7 +68,7 @@ class TimedQueue:
 
     def due(self) -> list[Any]:
         """Remove those whose wake-ups are due; gives them in their order."""
-        values = []
-        while self.is_due():
-            values.append(self.pop())
+        content, values = self.content, []
+        while content and (wake := content[0][3]) is not None and wake.due:
+            values.append(heappop(content)[4])
         return values

@@ -43,10 +43,13 @@ cdef class ReadyQueue:
         items[place] = rank
         return 0
 
-    cdef long long pop(self) except? -1:
+    cdef long long pop(self) noexcept:
         cdef long long* items = self.items
-        cdef long long least = items[0], last
+        cdef long long least, last
         cdef Py_ssize_t place = 0, below
+        if not self.size:
+            return -1
+        least = items[0]
         self.size -= 1
         last = items[self.size]
         while True:
@@ -104,12 +107,12 @@ cdef class TimedQueue:
     cpdef push(self, Wake wake, value):
         self.put(wake.time, wake.microstep, wake, value)
 
-    cdef int put(self, long long time, long microstep, Wake wake, value) except -1:
+    cdef Py_ssize_t put(self, long long time, long microstep, Wake wake, value) except -1:
         cdef Item item
         item.time, item.microstep, item.number = time, microstep, self.number
         self._insert(item, wake, value)
         self.number += 1
-        return 0
+        return self.size
 
     cdef int _insert(self, Item item, wake, value) except -1:
         cdef Py_ssize_t place, above

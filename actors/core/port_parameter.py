@@ -113,7 +113,9 @@ class PortParameter(Parameter[T]):
     def __get__(self, instance: Any, owner: type) -> PortParameter[T] | T:
         if instance is None:
             return self
-        return self.port_of(instance).current()
+        port: ParameterPort[T] = instance.inputs[self.port_name]  # as in port_of and current, without the calls
+        result: T = port._current if port._received is _NOTHING else port.current()
+        return result
 
     def __set__(self, instance: Any, value: T) -> None:
         raise AttributeError(f"{instance.path}.{self.name} can only be changed by a token at its port")

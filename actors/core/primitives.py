@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 nearest: Final = round  # the nearest whole number, of two the even one
-
+empty: Final = list.clear
 
 _MANY: Final = 64  # words taken from the generator at once, at a tenth of the cost of one by one
 
@@ -31,8 +31,3 @@ class Words:
 def is_alone(thing: object) -> bool:
     """Whether an object in a variable of the caller has no other reference; Python does not check."""
     return False
-
-
-def empty(tokens: list[Any]) -> None:
-    """Empty a list."""
-    tokens.clear()

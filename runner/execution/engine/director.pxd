@@ -43,11 +43,12 @@ cdef class Director:
     @cython.locals(instant=Instant)
     cpdef Instant take(self)
     cpdef enqueue(self, Activation activation)
-    @cython.locals(activation=Activation)
+    @cython.locals(activation=Activation, rank=cython.long)
     cpdef Activation next_activation(self)
     cpdef bint has_reason(self, Activation activation) except -1
     @cython.locals(
-        activation=Activation, delivery=Delivery, place=cython.Py_ssize_t, ready=ReadyQueue, is_plain=cython.bint
+        activation=Activation, delivery=Delivery, place=cython.Py_ssize_t, ready=ReadyQueue, rank=cython.long,
+        is_plain=cython.bint,
     )
     cpdef handle(self, Instant instant)
     cpdef _wake_up(self, Activation activation, Wake wake)

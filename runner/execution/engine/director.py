@@ -278,12 +278,13 @@ class Director:
 
     def next_activation(self) -> Activation | None:
         """The next activation at the present tag, which is no longer lined up; None if there is none."""
-        if not self._ready.size:
+        rank = self._ready.pop()
+        if rank < 0:
             return None
-        activation = self.activations[self._ready.pop()]
+        activation = self.activations[rank]
         assert activation is not None
         activation.is_scheduled = False
-        self.rank = activation.rank
+        self.rank = rank
         return activation
 
     def has_reason(self, activation: Activation) -> bool:
@@ -308,13 +309,11 @@ class Director:
 
     def _await(self, time: int, microstep: int) -> Instant:
         """Put a tag into the agenda."""
-        if self._times.size > self._most_times:
+        past, self._past = self._past, None
+        self._latest = instant = new_instant(time, microstep, past)
+        if self._times.put(time, microstep, None, instant) > self._most_times + 1:
             what = "times with something still to come"
             raise CrowdError(Tag(time, microstep), self._most_times, what, self._who())
-        past, self._past = self._past, None
-        instant = new_instant(time, microstep, past)
-        self._times.put(time, microstep, None, instant)
-        self._latest = instant
         return instant
 
     def take(self) -> Instant:
@@ -345,12 +344,13 @@ class Director:
         try:
             while True:
                 if is_plain:  # as in next_activation and has_reason, without the calls: this happens for every firing
-                    if not ready.size:
+                    rank = ready.pop()
+                    if rank < 0:
                         break
-                    activation = self.activations[ready.pop()]
+                    activation = self.activations[rank]
                     assert activation is not None
                     activation.is_scheduled = False
-                    self.rank = activation.rank
+                    self.rank = rank
                     if activation.wake is not None and not self.use_wakes(activation):
                         continue
                 elif (activation := self.next_activation()) is None:
