@@ -9,12 +9,13 @@ cdef class Receiver:
 
 
 cdef class Emitter(Receiver):
-    cpdef send(self, token, channel=*)
+    cpdef Receiver to(self, channel)
 
 
 cdef class _Told(Emitter):
-    cdef public object function
-    cpdef send(self, token, channel=*)
+    cdef public object channel, function
+    cpdef put(self, token)
+    cpdef Receiver to(self, channel)
 
 
 cdef class Terms:
@@ -49,4 +50,5 @@ cdef class InputPort(Port):
 cdef class OutputPort(Port):
     cdef public Emitter emitter
     cpdef begin(self, like)
+    @cython.locals(emitter=Emitter)
     cpdef send(self, token, channel=*)

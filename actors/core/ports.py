@@ -44,25 +44,29 @@ class Receiver:
 
 
 class Emitter(Receiver):
-    """What ``send`` does in a running model."""
+    """What ``send`` does in a running model: ``put`` sends a token to all channels."""
 
     __slots__ = ()
 
-    def send(self, token: Any, channel: int | None = None) -> None:
-        """Send a token to all channels, or to one."""
+    def to(self, channel: int) -> Receiver:
+        """The way to one channel."""
         raise NotImplementedError
 
 
 class _Told(Emitter):
     """Passes sent tokens to a function."""
 
-    __slots__ = ("function",)
+    __slots__ = ("channel", "function")
 
-    def __init__(self, function: Callable[..., None]) -> None:
+    def __init__(self, function: Callable[..., None], channel: int | None = None) -> None:
         self.function = function
+        self.channel = channel
 
-    def send(self, token: Any, channel: int | None = None) -> None:
-        self.function(token, channel)
+    def put(self, token: Any) -> None:
+        self.function(token, self.channel)
+
+    def to(self, channel: int) -> Receiver:
+        return _Told(self.function, channel)
 
 
 class Terms:
@@ -307,11 +311,15 @@ class OutputPort(Port[T]):
 
     def send(self, token: T, channel: int | None = None) -> None:
         """Send a token at the present tag: to all channels, or to the one given."""
-        if self.emitter is None:
+        emitter = self.emitter
+        if emitter is None:
             raise PortError(
                 f"{self.path or self.name} cannot send now: send tokens only in fire() or run() of a running model"
             )
-        self.emitter.send(token, channel)
+        if channel is None:
+            emitter.put(token)
+        else:
+            emitter.to(channel).put(token)
 
     def connect(self, emit: Emitter | Callable[..., None]) -> None:
         """Engine: set what ``send`` does from now on; a function is called with token and channel."""

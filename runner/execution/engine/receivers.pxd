@@ -46,12 +46,12 @@ cdef class Sender(Emitter):
     cdef public Receiver onward
     cdef public dict single
     cpdef put(self, token)
-    cpdef send(self, token, channel=*)
-    cpdef Sender to(self, channel)
+    cpdef Receiver to(self, channel)
 
 
 cdef class WovenSender(Emitter):
     cdef public Sender sender
     cdef public object woven
     cdef public dict entries
-    cpdef send(self, token, channel=*)
+    cpdef put(self, token)
+    cpdef Receiver to(self, channel)

@@ -159,13 +159,6 @@ class Sender(Emitter):
         self.writer.write(self.director.tag if present is None else present, token)
         self.onward.put(token)
 
-    def send(self, token: Any, channel: int | None = None) -> None:
-        """Send a token to all channels, or to one."""
-        if channel is None:
-            self.put(token)
-        else:
-            self.to(channel).put(token)
-
     def to(self, channel: int) -> Sender:
         """The sender to one channel."""
         if self.single is None:
@@ -193,13 +186,19 @@ class WovenSender(Emitter):
         self.woven = woven
         self.entries: dict[int | None, Receiver] = {}
 
-    def send(self, token: Any, channel: int | None = None) -> None:
-        """Send a token to all channels, or to one."""
+    def put(self, token: Any) -> None:
+        self.to(None).put(token)
+
+    def to(self, channel: int | None) -> Receiver:
+        """The way to all channels, or to one."""
         entry = self.entries.get(channel)
         if entry is None:
-            onward: Receiver = self.sender if channel is None else Call(partial(self.sender.send, channel=channel))
+            onward: Receiver = self.sender if channel is None else Call(partial(self._send, channel))
             entry = self.entries[channel] = self.woven(onward)
-        entry.put(token)
+        return entry
+
+    def _send(self, channel: int, token: Any) -> None:
+        self.sender.to(channel).put(token)
 
 
 def all_of(ways: list[Receiver]) -> Receiver:
