@@ -116,13 +116,13 @@ class TracingLog(EventLog):
         super().__init__(keeps)
         self._tracer = tracer
 
-    def new_writer(self, names: Names, keep: Callable[[Record], None] | None) -> Writer:
-        return _TracingWriter(self, names, keep, self._tracer)
+    def new_writer(self, names: Names, keeps: bool) -> Writer:
+        return _TracingWriter(self, names, keeps, self._tracer)
 
 
 class _TracingWriter(Writer):
-    def __init__(self, log: EventLog, names: Names, keep: Callable[[Record], None] | None, tracer: Tracer) -> None:
-        super().__init__(log, names, keep)
+    def __init__(self, log: EventLog, names: Names, keeps: bool, tracer: Tracer) -> None:
+        super().__init__(log, names, keeps)
         self._tracer = tracer
 
     def write(self, when: Tag | Moment, value: Any) -> None:

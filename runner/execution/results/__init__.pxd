@@ -1,2 +1,1 @@
-from epicycle.runner.execution.results.log cimport EventLog, Writer
-from epicycle.runner.execution.results.record cimport Samples
+from epicycle.runner.execution.results.record cimport Samples, Writer

@@ -2,10 +2,10 @@
 
 from .arrow import write_signals
 from .encoding import TokenError, canonical, cell, leaves, plain
-from .log import EventLog, LogError, Names, Record, Writer
+from .log import EventLog, LogError, Record
 from .log_file import LogFile, check_log_path, write_log
 from .outcome import Interval, Outcome
-from .record import Past, Samples
+from .record import Names, Past, Samples, Writer
 from .results import STOP_TIME, Results
 from .signal import Signal, SignalError
 from .verdict import Verdict

@@ -22,8 +22,8 @@ import numpy as np
 
 from epicycle.actors import EpicycleError
 
-_DOUBLE = struct.Struct("<cd").pack
-_INTEGER = struct.Struct("<cq").pack
+DOUBLE = struct.Struct("<cd").pack
+INTEGER = struct.Struct("<cq").pack
 _COUNT = struct.Struct("<I").pack
 
 
@@ -113,12 +113,12 @@ def _encoder(cls: type) -> Encode:
 
 
 def _float(token: float) -> bytes:
-    return _NAN if token != token else _DOUBLE(b"f", token)  # noqa: PLR0124  true of NaN; without a call
+    return _NAN if token != token else DOUBLE(b"f", token)  # noqa: PLR0124  true of NaN; without a call
 
 
 def _integer(token: int) -> bytes:
     if -(2**63) <= token < 2**63:
-        return _INTEGER(b"i", token)
+        return INTEGER(b"i", token)
     return b"I" + _text(str(token))
 
 

@@ -12,16 +12,12 @@ from epicycle.actors import EpicycleError, Moment, Tag, new_tag, to_seconds
 from ...support.shown import short
 from ...support.tables import pandas_module
 from .encoding import canonical, plain
-from .record import Past, RecordHash
+from .record import Names, Past, RecordHash, Writer
 
 if TYPE_CHECKING:
     import pandas
 
 COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "value")
-_MANY = 10_000  # records at one tag
-
-
-Names = tuple[str, str, str, "int | None", str]  # event, actor, port, channel, aspect
 
 
 class LogError(EpicycleError):
@@ -66,32 +62,6 @@ class Record:
         )
 
 
-class Writer:
-    """Appends records with the same names to a log; each needs only a tag and a value."""
-
-    __slots__ = ("_keep", "_number", "log", "names")
-
-    def __init__(self, log: EventLog, names: Names, keep: Callable[[Record], None] | None) -> None:
-        self.names = names
-        self.log = log
-        self._number = b""  # of these names; none before the first record
-        self._keep = keep
-
-    def write(self, when: Tag | Moment, value: Any) -> None:
-        """Append a record; raises an exception if the value cannot be logged."""
-        hashed = self.log.hash
-        self._number = hashed.add(self._number, b"" if self._number else _encoded(self.names), when, value)
-        if hashed.at_tag > _MANY:
-            self.log.report(when, f"{self.names[1]}.{self.names[2]}")
-        if self._keep is not None:
-            self._keep(Record(_tag(when), *self.names, value))
-
-
-def _encoded(names: Names) -> bytes:
-    event, actor, port, channel, aspect = names
-    return b"".join(map(canonical, (event, actor, port, aspect, channel)))
-
-
 def _tag(when: Tag | Moment) -> Tag:
     return when if type(when) is Tag else new_tag(when.time, when.microstep)
 
@@ -125,19 +95,21 @@ class EventLog:
         names = (event, actor, port, channel, aspect)
         if (writer := self._writers.get(names)) is None:
             keeps = self._keeps is not None and self._keeps(event, actor, port, aspect)
-            keep = (self._log_to or self.records.append) if keeps else None
-            writer = self._writers[names] = self.new_writer(names, keep)
+            writer = self._writers[names] = self.new_writer(names, keeps)
         return writer
 
-    def new_writer(self, names: Names, keep: Callable[[Record], None] | None) -> Writer:
-        """A new writer."""
-        return Writer(self, names, keep)
+    def new_writer(self, names: Names, keeps: bool) -> Writer:
+        """A new writer, whose records are kept or not."""
+        return Writer(self, names, keeps)
 
-    def report(self, when: Tag | Moment, port: str) -> None:
+    def keep(self, when: Tag | Moment, names: Names, value: Any) -> None:
+        """Keep a record, or pass it on."""
+        (self._log_to or self.records.append)(Record(_tag(when), *names, value))
+
+    def report(self, when: Tag | Moment, names: Names, number: int) -> None:
         """Report very many records at one tag, the last of them sent by a port just now."""
-        number, self.hash.at_tag = self.hash.at_tag, 0
         if self.crowd is not None:
-            self.crowd(_tag(when), port, number)
+            self.crowd(_tag(when), f"{names[1]}.{names[2]}", number)
 
     @property
     def count(self) -> int:

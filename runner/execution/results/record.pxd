@@ -19,7 +19,7 @@ cdef class RecordHash:
     cdef bint is_fixed
     cdef int level  # of the lists and mappings around what is encoded
     cdef dict known
-    cpdef bytes add(self, bytes number, bytes names, when, value)
+    cdef bytes add(self, bytes number, tuple names, when, value)
     cdef int need(self, Py_ssize_t more) except -1
     cdef int put_bytes(self, bytes data) except -1
     cdef void put_little(self, uint64_t number, int size) noexcept
@@ -31,6 +31,15 @@ cdef class RecordHash:
     cdef int put_mapping(self, dict token, int depth) except -1
     cdef int put_other(self, token) except -1
     cdef int update(self) except -1
+
+
+cdef class Writer:
+    cdef public object log
+    cdef public tuple names
+    cdef public bytes _number
+    cdef public RecordHash _hash
+    cdef public bint _keeps
+    cpdef write(self, when, value)
 
 
 cdef class Samples:

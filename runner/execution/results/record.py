@@ -6,17 +6,21 @@ import hashlib
 import struct
 from array import array
 from collections.abc import Callable, Iterable
-from functools import cache
-from typing import Any, TypeVar
+from functools import cache, lru_cache
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from epicycle.actors import Moment, Tag
 
-from .encoding import encoders, field_values
+from .encoding import DOUBLE, INTEGER, canonical, encoders, field_values
 
 T = TypeVar("T")
 
+Names = tuple[str, str, str, "int | None", str]  # event, actor, port, channel, aspect
+
+_MANY = 10_000  # records at one tag
+_EDGE = 2**63  # of the whole numbers that have eight bytes
 _FULL = 65_536  # bytes that are hashed together
 _TAG = struct.Struct("<bq").pack
 _SIMPLE = frozenset({float, int, bool, type(None), str, np.float64})  # types whose tokens cannot change
@@ -29,45 +33,33 @@ class RecordHash:
     cannot change is encoded once.
     """
 
-    __slots__ = ("_buffer", "_hash", "_known", "_names", "_tag", "_when", "at_tag", "count")
+    __slots__ = ("_hash", "_known", "_names", "_tag", "buffer", "count", "most", "when")
 
     def __init__(self) -> None:
         self.count = 0  # records
-        self.at_tag = 0  # of these, at the last tag
+        self.most = _MANY  # of these, until many at one tag are reported
         self._hash = hashlib.sha256()
-        self._buffer = bytearray()  # still to be hashed
+        self.buffer = bytearray()  # still to be hashed
         self._names = 0  # different names so far
         self._tag = b""  # of the last record
-        self._when: Tag | Moment | None = None  # an object that represents it
+        self.when: Tag | Moment | None = None  # an object that represents it
         self._known: dict[int, tuple[Any, bytes]] = {}  # tokens that cannot change, with their bytes, by id
 
-    def add(self, number: bytes, names: bytes, when: Tag | Moment, value: Any) -> bytes:
-        """Append a record; ``number`` is that of its names, empty if they are new.  Returns their number.
+    def come_to(self, when: Tag | Moment) -> None:
+        """Begin the records of a tag, unless that of the last record is the same."""
+        self.when = when
+        tag = _TAG(0, when.time) + unsigned(when.microstep)
+        if tag != self._tag:
+            self._tag, self.most = tag, self.count + _MANY
+            self.buffer += tag
 
-        Raises an exception, and appends nothing, if the value cannot be encoded.
-        """
-        cls = type(value)
-        data = encoders[cls](value) if cls in _SIMPLE else self._encoded(value)
-        if when is not self._when:
-            self._when = when
-            tag = _TAG(0, when.time) + unsigned(when.microstep)
-            if tag != self._tag:
-                self._tag, self.at_tag = tag, 0
-                self._buffer += tag
-        if not number:
-            self._names += 1
-            number = unsigned(self._names)
-            self._buffer += number + names
-        else:
-            self._buffer += number
-        self._buffer += data
-        self.count += 1
-        self.at_tag += 1
-        if len(self._buffer) > _FULL:
-            self._update()
-        return number
+    def new_number(self) -> bytes:
+        """A number for new names, by which records refer to them."""
+        self._names += 1
+        return unsigned(self._names)
 
-    def _encoded(self, token: Any) -> bytes:
+    def encoded(self, token: Any) -> bytes:
+        """The bytes of a token."""
         known = self._known.get(id(token))
         if known is not None and known[0] is token:  # in a copy of a run, tokens have other ids
             return known[1]
@@ -76,17 +68,73 @@ class RecordHash:
             self._known[id(token)] = token, data
         return data
 
-    def _update(self) -> None:
-        self._hash.update(self._buffer)
-        self._buffer.clear()
+    def update(self) -> None:
+        """Hash what has been appended."""
+        self._hash.update(self.buffer)
+        self.buffer.clear()
         self._known.clear()
 
     def hexdigest(self) -> str:
         """The SHA-256 so far, as hexadecimal text."""
-        self._update()
+        self.update()
         return self._hash.hexdigest()
 
 
+class Log(Protocol):
+    """What a writer needs to know of its log."""
+
+    hash: RecordHash
+
+    def keep(self, when: Tag | Moment, names: Names, value: Any) -> None:
+        """Keep a record."""
+
+    def report(self, when: Tag | Moment, names: Names, number: int) -> None:
+        """Report very many records at one tag."""
+
+
+class Writer:
+    """Appends records with the same names to a log; each needs only a tag and a value."""
+
+    __slots__ = ("_hash", "_keeps", "_number", "log", "names")
+
+    def __init__(self, log: Log, names: Names, keeps: bool) -> None:
+        self.names = names
+        self.log = log
+        self._hash = log.hash
+        self._number = b""  # of these names; none before the first record
+        self._keeps = keeps
+
+    def write(self, when: Tag | Moment, value: Any) -> None:
+        """Append a record; raises an exception, and appends nothing, if the value cannot be logged."""
+        hashed = self._hash
+        cls = type(value)
+        if (cls is float or cls is np.float64) and value == value:  # noqa: PLR0124  so it is no NaN
+            data = DOUBLE(b"f", value)
+        elif cls is int and -_EDGE <= value < _EDGE:
+            data = INTEGER(b"i", value)
+        else:
+            data = hashed.encoded(value)
+        if when is not hashed.when:
+            hashed.come_to(when)
+        buffer = hashed.buffer
+        buffer += (self._number or self._introduced()) + data
+        if len(buffer) > _FULL:
+            hashed.update()
+        hashed.count = count = hashed.count + 1
+        if count > hashed.most:
+            hashed.most += _MANY + 1
+            self.log.report(when, self.names, _MANY + 1)
+        if self._keeps:
+            self.log.keep(when, self.names, value)
+
+    def _introduced(self) -> bytes:
+        """Give the names a number; returns both."""
+        event, actor, port, channel, aspect = self.names
+        self._number = self._hash.new_number()
+        return self._number + b"".join(map(canonical, (event, actor, port, aspect, channel)))
+
+
+@lru_cache
 def unsigned(number: int) -> bytes:
     """A whole number as unsigned LEB128: seven bits a byte, the lowest first; the last byte is below 128."""
     data = bytearray()

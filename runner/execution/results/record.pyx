@@ -19,10 +19,12 @@ from array import array as new_array
 
 import numpy as np
 
-from .encoding import canonical_inside, field_names, is_record, sorted_names
+from .encoding import canonical, canonical_inside, field_names, is_record, sorted_names
 
 numpy.import_array()
 
+Names = tuple
+cdef Py_ssize_t MANY = 10_000
 cdef Py_ssize_t FULL = 65_536
 cdef bint IS_LITTLE = np.little_endian
 cdef uint64_t NAN_BITS = 0x7FF8000000000000
@@ -77,7 +79,8 @@ cdef class RecordHash:
         self.put_bytes(written)
         self.used = self.end
 
-    cpdef bytes add(self, bytes number, bytes names, when, value):
+    cdef bytes add(self, bytes number, tuple names, when, value):
+        """Append a record; ``number`` is that of its names, empty if they are new.  Returns their number."""
         cdef long long time = self.time
         cdef long microstep = self.microstep
         cdef bint is_new = not number, is_later
@@ -99,7 +102,8 @@ cdef class RecordHash:
             place = self.end
             self.put_unsigned(self.names + 1)
             number = PyBytes_FromStringAndSize(self.buffer + place, self.end - place)
-            self.put_bytes(names)
+            event, actor, port, channel, aspect = names
+            self.put_bytes(b"".join(map(canonical, (event, actor, port, aspect, channel))))
         else:
             self.put_bytes(number)
         if isinstance(value, float):
@@ -278,6 +282,24 @@ cdef class RecordHash:
                 memcpy(self.buffer + self.end + 8 * place, &NAN_BITS, 8)
         self.end += 8 * count
         return 0
+
+
+cdef class Writer:
+    __slots__ = ("_hash", "_keeps", "_number", "log", "names")
+
+    def __init__(self, log, names, keeps):
+        self.names, self.log, self._hash, self._number, self._keeps = names, log, log.hash, b"", keeps
+
+    cpdef write(self, when, value):
+        self._number = self._hash.add(self._number, self.names, when, value)
+        if self._hash.at_tag > MANY:
+            self._hash.at_tag = 0
+            self.log.report(when, self.names, MANY + 1)
+        if self._keeps:
+            self.log.keep(when, self.names, value)
+
+    def __reduce__(self):
+        return reduced(self)
 
 
 class Past(list):
