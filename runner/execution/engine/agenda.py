@@ -39,9 +39,9 @@ class Activation:
 
     def use_wakes(self) -> bool:
         """Make the wake-ups due; false if all were cancelled and there is no other reason to fire."""
-        due = False
-        if self.wake is not None and not self.wake.cancelled:
-            self.wake.due = due = True
+        due, wake = False, self.wake
+        if wake is not None and not wake.cancelled:
+            wake.due = due = True
         if self.wakes is not None:
             for wake in self.wakes:
                 if not wake.cancelled:

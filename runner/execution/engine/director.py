@@ -160,11 +160,12 @@ class Director:
 
     def wake(self, actor: Actor, time: int) -> Wake:
         """Fire ``actor`` at ``time``; the present or past is the next microstep."""
-        return self.wake_activation(self.activation(actor, self.ranks[actor.path]), time)
+        rank = self.ranks[actor.path]
+        return self.wake_activation(self.activations[rank] or self.activation(actor, rank), time)
 
     def wake_activation(self, activation: Activation, time: int) -> Wake:
         """Give an actor an activation at ``time``."""
-        now = self.now()
+        now = self.now() if self.present is None else self.present
         if self.present is None and time <= now.time:
             return self._call_now(activation, now)
         return self._wake_at(activation, self._to_come(now, time))
@@ -294,7 +295,8 @@ class Director:
     def _to_come(self, now: Instant, time: int) -> Instant:
         """The work after the present tag: at the next microstep, or at the first one of a later time."""
         if time > now.time:  # several instants may be of one time; they join when it comes
-            return self._latest if self._latest is not None and self._latest.time == time else self._await(time, 1)
+            latest = self._latest
+            return latest if latest is not None and latest.time == time else self._await(time, 1)
         if self._next is None:
             self._next = new_instant(now.time, now.microstep + 1)
             if self.present is None:
@@ -319,7 +321,8 @@ class Director:
     def take(self) -> Instant:
         """Take the next tag out of the agenda, with everything it is to do."""
         instant: Instant = self._times.pop()
-        if self._latest is not None and self._latest.time == instant.time:
+        latest = self._latest
+        if latest is not None and latest.time == instant.time:
             self._latest = None
         while self._times.first() == instant.time:
             instant.join(self._times.pop())
@@ -351,7 +354,7 @@ class Director:
                     assert activation is not None
                     activation.is_scheduled = False
                     self.rank = rank
-                    if activation.wake is not None and not self.use_wakes(activation):
+                    if activation.wake is not None and not activation.use_wakes():
                         continue
                 elif (activation := self.next_activation()) is None:
                     break
@@ -372,7 +375,11 @@ class Director:
         if wake is not None:
             activation.add(wake)
         if not activation.is_scheduled:
-            self.enqueue(activation)
+            if self.is_plain:  # as in enqueue
+                activation.is_scheduled = True
+                self._ready.push(activation.rank)
+            else:
+                self.enqueue(activation)
 
     def _begin(self, instant: Instant) -> None:
         """Something happens at a tag, for the first time."""
