@@ -45,6 +45,8 @@ class Distribution(Configurable):
     def draw_time(self, random: Stream, what: str = "a time") -> float:
         """A duration in s; raises ``EpicycleError`` if the value cannot be one."""
         time = self.draw(random)
+        if type(time) is float and time >= 0.0:  # nearly always
+            return time
         if isinstance(time, bool) or not isinstance(time, (int, float)) or not time >= 0:
             raise EpicycleError(f"{time!r} drawn from {self!r} is not {what} in s: it must be a number >= 0")
         return float(time)

@@ -147,7 +147,7 @@ class Server(Actor):
             if self.capacity is not None and self._size >= self.capacity:
                 self.rejected.send(token)
                 continue
-            if self.servers is None or len(self._served) < self.servers:
+            if self.servers is None or self._size - len(self._waiting) < self.servers:
                 self._serve(token, self.draw_time())
             else:
                 self._waiting.append((token, self.draw_time()))

@@ -215,7 +215,7 @@ class PoissonClock(_Ticking):
             self._wake.cancel()
         self._send(self._tick)
         self._tick += 1
-        self._wake = self._wake_at(self.tag.time + self.interval())
+        self._wake = self._wake_at(self.context.time + self.interval())
 
 
 class SingleEvent(Actor):

@@ -227,10 +227,11 @@ def _method(law: Callable[..., Any]) -> Callable[..., Any]:
     size = inspect.Parameter("size", inspect.Parameter.POSITIONAL_OR_KEYWORD, default=None)
     signature = own.replace(parameters=[first.replace(name="self"), *parameters, size])
     dtype = np.int64 if own.return_annotation == "int" else float
+    most = len(parameters)
 
     @functools.wraps(law)
     def draw(self: RandomStream, *values: Any, **named: Any) -> Any:
-        if not named and len(values) <= len(parameters):
+        if not named and len(values) <= most:
             for value in values:
                 if type(value) not in _PLAIN:
                     break
