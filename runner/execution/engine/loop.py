@@ -86,12 +86,11 @@ def handle_events(
             found, cause = of_process(error, actors, director.tag)
             raise found from cause
         if upcoming != now:
-            here = 0
+            here, now = 0, upcoming
         elif instant is None:
             here += 1
-        now = upcoming
-        if here > director._most_steps:
-            raise LoopError(director.tag.time, ())
+            if here > director._most_steps:
+                raise LoopError(director.tag.time, ())
         director.steps += 1
         if director.steps % _NOTICED == 0:
             notice(progress, now)
