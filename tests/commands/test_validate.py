@@ -93,11 +93,7 @@ connections:
   - {from: f.output, to: j.service_time, delay: "${number}"}
 run: {stop: "${wait ** 2}"}
 """
-WRONG_TIMES = """m.yaml:11:87: error: h.s.service_time: Constant.value: '2 km' is a length, expected a time in s
-   11 |     actors: {s: {type: Station, places: "${n}", service_time: {type: Constant, value: "${x}"}}}
-      |                                                                                       ^^^^^^
-
-m.yaml:15:61: error: a.distribution: Exponential.mean: '2 km' is a length, expected a time in s
+WRONG_TIMES = """m.yaml:15:61: error: a.distribution: Exponential.mean: '2 km' is a length, expected a time in s
    15 |   a: {type: Server, distribution: {type: Exponential, mean: "${length}"}}
       |                                                             ^^^^^^^^^^^
 
@@ -127,6 +123,11 @@ m.yaml:21:19: error: g.n: '3 min' is a time, expected a number
    21 |   g: {type: C, n: "${wait}", x: 1 min}
       |                   ^^^^^^^^^
    help: declared by Station.places
+
+m.yaml:22:25: error: h.x: '2 km' is a length, expected a time in s
+   22 |   h: {type: C, n: 2, x: "${length}"}
+      |                         ^^^^^^^^^^^
+   help: declared by Constant.value
 
 m.yaml:23:66: error: i.distribution: Bernoulli.probability: '50 ms' is a time, expected a number
    23 |   i: {type: Random, distribution: {type: Bernoulli, probability: 50 ms}}

@@ -8,8 +8,6 @@ from functools import cache, wraps
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from epicycle.actors import EpicycleError
-
 from .commands import Declared, declared
 
 P = ParamSpec("P")
@@ -38,6 +36,8 @@ def _declared(call: Callable[..., Any]) -> dict[str, Declared]:
 
 
 def _read(parameter: Declared, value: Any) -> Any:
+    from epicycle.actors import EpicycleError
+
     name, option = parameter.name, parameter.option
     if value is None or parameter.is_switch or option.is_argument:
         return value
