@@ -30,7 +30,6 @@ actors, copies of those in the model, and a snapshot of a run has copies of thes
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any, ClassVar, Protocol, Self, cast
 from weakref import WeakKeyDictionary
@@ -208,7 +207,6 @@ class Actor(Configurable):
         """Engine: the actor becomes part of a run."""
         self.context = context
         self._streams = None
-        vars(self).pop("random", None)
         for port in self.inputs.values():
             if isinstance(port, ParameterPort):
                 port.reset()
@@ -223,7 +221,7 @@ class Actor(Configurable):
         """The present time in seconds."""
         return to_seconds(self.context.time)
 
-    @cached_property
+    @property
     def random(self) -> Stream:
         """The actor's random stream."""
         return self.random_stream("")
