@@ -30,8 +30,6 @@ cdef class Port:
     cdef public Terms terms
     cdef public str path
     cdef public Py_ssize_t width
-    cpdef change(self, str option, value)
-    cpdef bind(self, actor)
     @cython.locals(bound=Port)
     cpdef twin(self, actor)
     cpdef begin(self, like)
@@ -43,8 +41,6 @@ cdef class InputPort(Port):
     cpdef open(self)
     cpdef receive(self, token, channel)
     cpdef clear(self)
-    cpdef take(self)
-    cpdef give(self, taken)
 
 
 cdef class OutputPort(Port):

@@ -1,7 +1,5 @@
 # Types for C; log.py has the documentation.
 
-cimport cython
-
 from epicycle.runner.execution.results.record cimport RecordHash
 
 cdef class EventLog:
