@@ -206,10 +206,10 @@ def _new_programs(problem: Problem, shape: tuple[int, ...], max_iterations: int,
     try:
         limits, coupled = posed.limits(controls).ravel(), posed.constraints(controls)
         cost = posed.cost(controls, positive)
-    except RuntimeError as error:
-        if "truth value" not in str(error):
-            raise
-        told = SolverError(f"a symbol is compared here: {_WRITTEN_FOR_BOTH}")
+    except NotImplementedError:  # a method that is missing
+        raise
+    except RuntimeError as error:  # CasADi's own
+        told = SolverError(f"a symbol cannot be used so, {str(error).rpartition(': ')[2]!r}: {_WRITTEN_FOR_BOTH}")
         raise told.with_traceback(error.__traceback__) from None
     within = [each for values, _ in found for each in values]
     parts = [each for _, made in found for each in np.ravel(made)]
