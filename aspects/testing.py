@@ -111,9 +111,9 @@ def assert_streams_are_its_own(aspect: Aspect, trial: RunModel, at: str | Sequen
     """Each join point has its own random stream, which nothing moves, and no randomness comes from elsewhere.
 
     No two join points share a stream; at each one, the stream and the decisions of the aspect stay the same when it is
-    attached to half of them, beside another one of its kind.  (Decisions may depend on other join points if the aspect
-    uses ``point.shared``.)  The global generators of ``random`` and NumPy are not used, and the same aspect decides the
-    same in a second run.
+    attached to half of them, beside another one of its kind; of processors, which an actor has one of, that is at the
+    other half.  (Decisions may depend on other join points if the aspect uses ``point.shared``.)  The global generators
+    of ``random`` and NumPy are not used, and the same aspect decides the same in a second run.
     """
     before = _shared_generators()
     alone = _Visits(aspect, acts=False)
@@ -131,9 +131,11 @@ def assert_streams_are_its_own(aspect: Aspect, trial: RunModel, at: str | Sequen
             raise AssertionError(f"{aspect!r} has the same random stream for {ports[stream]} and {port}")
         ports[stream] = port
 
-    half = list(alone.streams)[::2]
+    half, rest = list(alone.streams)[::2], list(alone.streams)[1::2]
+    others = rest if isinstance(aspect, ExecutionAspect) and aspect.is_processor else at
     here, beside = _Visits(aspect, acts=False), _Visits(aspect, acts=False, tells=False)
-    acts_of_half = _acts(trial(Woven(OTHER, beside.aspect, at), Woven(NAME, here.aspect, half)))
+    other = [Woven(OTHER, beside.aspect, others)] if others else []
+    acts_of_half = _acts(trial(*other, Woven(NAME, here.aspect, half)))
     for port in half:
         if here.streams.get(port) != alone.streams[port]:
             raise AssertionError(f"{aspect!r}: its random stream at {port} depends on where else it is attached")
