@@ -94,3 +94,10 @@ def varied(tmp_path: Path) -> Recording:
     path = tmp_path / "varied.yaml"
     path.write_text(VARIED, encoding="utf-8")
     return recorded(load_model(path, types=[Varied]))
+
+
+@pytest.fixture(scope="module")
+def wifi_page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page of a run with bursts of lost messages."""
+    path = tmp_path_factory.mktemp("view") / "wifi.html"
+    return written(path, ("collision_avoidance", {"disturb": ["wifi_burst"]}))
