@@ -422,12 +422,10 @@ def declared_parameters(cls: type) -> Mapping[str, Parameter[Any]]:
 
 def unknown_parameter(cls: type, name: str) -> str:
     """The message for a parameter that the class does not have."""
-    what = f"{cls.__name__} has no parameter"
-    if issubclass(cls, Configurable):
-        if name in cls.refused:
-            return cls.refused[name]
-        if cls.written_as:
-            what = f"{cls.written_as} has no key"
+    if issubclass(cls, Configurable) and name in cls.refused:
+        return cls.refused[name]
+    written = getattr(cls, "written_as", "")
+    what = f"{written} has no key" if written else f"{cls.__name__} has no parameter"
     return f"{what} {name!r}{did_you_mean(name, declared_parameters(cls))}"
 
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from operator import not_
 from typing import Final
 
 import numpy as np
 
 nearest: Final = round  # the nearest whole number, of two the even one
 empty: Final = list.clear
-is_alone: Final = not_  # whether an object in a variable of the caller has no other reference: Python does not look
 
 _MANY: Final = 64  # words taken from the generator at once, at a tenth of the cost of one by one
 
@@ -28,3 +26,8 @@ class Words:
         if not self._ahead:
             self._ahead = self._bits.random_raw(_MANY)[::-1].tolist()
         return self._ahead.pop()
+
+
+def is_alone(thing: object) -> bool:
+    """Whether an object in a variable of the caller has no other reference; Python does not check."""
+    return False

@@ -58,9 +58,8 @@ _OPERATOR_SIGNS: Final[dict[type[ast.AST], str]] = {
     ast.Invert: "~", ast.Is: "is", ast.IsNot: "is not",
 }  # fmt: skip
 _OPERATOR_HINTS: Final = {"^": " (a power is written **)", "is": " (write ==)", "is not": " (write !=)"}
-_OF_OTHERS: Final = re.compile(
-    r"&&|\|\||\?|!(?!=)|(?<![=!<>])=(?!=)"
-)  # signs of other languages, which end Python's reading
+# Signs of other languages, which end Python's reading.
+_OF_OTHERS: Final = re.compile(r"&&|\|\||\?|!(?!=)|(?<![=!<>])=(?!=)")
 _OURS: Final = {"&&": "and", "||": "or", "?": "'a if b else c'", "!": "not", "=": "=="}
 
 

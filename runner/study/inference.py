@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, TypeGuard
 
 from epicycle.actors import normal_quantile, random_stream
 
+from ..model.language.claims import MAX_NUMBER
 from ..support.shown import rounded
 from ..support.student import student_quantile, student_tail
 
@@ -25,8 +26,8 @@ _EXPONENT = 400  # of 2: what is between 2^-400 and 2^400 can be squared and add
 
 
 def is_usable(value: float | None) -> TypeGuard[float]:
-    """Whether statistics can be made of a value: it is a number, and sums of some such numbers are finite."""
-    return value is not None and abs(value) < 1e305
+    """Whether statistics can be made of a value: all others count as missing."""
+    return value is not None and abs(value) < MAX_NUMBER
 
 
 @dataclass(frozen=True)
@@ -55,18 +56,15 @@ def _standard_error(values: Sequence[float]) -> float:
 
 
 def deviation(values: Sequence[float]) -> float:
-    """The standard deviation of a sample, of two values or more; infinite if it exceeds the range of floats."""
+    """The standard deviation of a sample, of two values or more."""
     scaled, exponent = in_range(values)
     mean = math.fsum(scaled) / len(scaled)
     gaps = [value - mean for value in scaled]
-    return math.ldexp(math.sqrt(math.fsum(gap * gap for gap in gaps) / (len(values) - 1)), exponent - 1) * 2.0
+    return math.ldexp(math.sqrt(math.fsum(gap * gap for gap in gaps) / (len(values) - 1)), exponent)
 
 
 def in_range(values: Sequence[float]) -> tuple[Sequence[float], int]:
-    """Values whose sums and squares are floats, too: where these are too large or too small, divided by a power of 2.
-
-    The power comes with them.  Nothing is rounded, and where it is 1, as nearly always, nothing is other than it was.
-    """
+    """Values, divided by a power of 2 where their squares would be too large or too small; and its exponent."""
     exponent = math.frexp(max(map(abs, values), default=0.0))[1]
     if abs(exponent) <= _EXPONENT:
         return values, 0
@@ -74,13 +72,10 @@ def in_range(values: Sequence[float]) -> tuple[Sequence[float], int]:
 
 
 def mean(values: Sequence[float], level: float = LEVEL) -> Estimate:
-    """The mean with Student's interval; NaN where there are no values, an infinite interval for one.
-
-    It is NaN, too, if a value is infinite, as is the difference of two numbers at the ends of the range of floats.
-    """
+    """The mean with Student's interval; NaN where there are no values, an infinite interval for one."""
     count = len(values)
-    if count == 0 or not all(map(math.isfinite, values)):
-        return Estimate(math.nan, math.nan, -math.inf, math.inf, count)
+    if count == 0:
+        return Estimate(math.nan, math.nan, -math.inf, math.inf, 0)
     scaled, exponent = in_range(values)
     value, half = math.ldexp(math.fsum(scaled) / count, exponent), half_width(values, level)
     return Estimate(value, _standard_error(values), value - half, value + half, count)
@@ -146,7 +141,7 @@ def paired_difference(first: dict[int, float], second: dict[int, float], level: 
     scale = max((max(abs(first[each]), abs(second[each])) for each in common), default=0.0)
     gaps = without_rounding((second[each] - first[each] for each in common), scale)
     estimate = mean(gaps, level)
-    if len(gaps) < 2 or math.isnan(estimate.value):
+    if len(gaps) < 2:
         return Difference(estimate, math.nan)
     if min(gaps) == max(gaps):
         return Difference(estimate, 1.0 if gaps[0] == 0 else math.ldexp(1.0, 1 - len(gaps)))
@@ -170,10 +165,8 @@ def share_above(limit: float, values: Sequence[float], level: float = LEVEL) -> 
 
 def without_rounding(values: Iterable[float], scale: float) -> list[float]:
     """Differences of numbers of some size, cleaned of rounding errors: 4.8 - 4.7 and 5.0 - 4.9 are equal."""
-    quantum = math.ldexp(1.0, math.frexp(scale)[1] - 42) if math.isfinite(scale) else 0.0
-    if not quantum:
-        return list(values)
-    return [round(value / quantum) * quantum if math.isfinite(value) else value for value in values]
+    quantum = math.ldexp(1.0, math.frexp(scale)[1] - 42)
+    return [round(value / quantum) * quantum for value in values] if quantum else list(values)
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

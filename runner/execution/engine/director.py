@@ -375,11 +375,7 @@ class Director:
         if wake is not None:
             activation.add(wake)
         if not activation.is_scheduled:
-            if self.is_plain:  # as in enqueue
-                activation.is_scheduled = True
-                self._ready.push(activation.rank)
-            else:
-                self.enqueue(activation)
+            self.enqueue(activation)
 
     def _begin(self, instant: Instant) -> None:
         """Something happens at a tag, for the first time."""

@@ -180,7 +180,6 @@ def explain(
 
     >>> epicycle.explain("collision_avoidance", "always clearance.distance >= 4 m", seed=3, set={"disturbance": 0.5})
     """
-
     from ...search.explaining import explain as search
     from ...search.monitored import monitors_named
     from ...study.run_spec import spec_of

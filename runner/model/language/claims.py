@@ -13,6 +13,7 @@ from ..text.reading import Text
 from .dimensions import Factor
 from .fields import AT, LABEL, TEXT, Reader, Schema, keyed, number, ref
 
+MAX_NUMBER = 1e305  # below which statistics are made of numbers
 LESS, GREATER, RISES, FALLS, ALWAYS = "less", "greater", "rises", "falls", "always"
 FORMS = {
     LESS: ("at", "than", "where", "share"),

@@ -17,12 +17,24 @@ from ..text.faults import blame
 from ..text.kinds import OF_STUDY
 from ..text.problems import POISON, Poison, Position, Problems
 from ..text.reading import NodeReader, Text, inside
-from .claims import ALWAYS, FALLS, FORMS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection, shown_level
+from .claims import (
+    ALWAYS,
+    FALLS,
+    FORMS,
+    GREATER,
+    LESS,
+    MAX_NUMBER,
+    RISES,
+    Claim,
+    Guideline,
+    Questions,
+    Selection,
+    shown_level,
+)
 from .dimensions import Dimension, Factor, as_factor
 from .fields import TEXTS, Field, Reader, Record, Schema, names_of, node_as, ref
 from .files import named_file
 
-MAX_NUMBER = 1e305  # that statistics can be made of
 MAX_CONDITIONS = 10_000  # of a study with claims or a guideline, which evaluate all of them
 
 

@@ -27,6 +27,7 @@ from ...execution.results import STOP_TIME, Results
 from ...model.build.figures import figures_of
 from ...model.build.model import Model
 from ...model.catalogue.figure import Figure
+from ...model.language.claims import MAX_NUMBER
 from ...model.text.problems import Problems
 from ...study.inference import half_width
 from ...study.plan.plan import Plan
@@ -140,6 +141,7 @@ def over_time(runs: Sequence[tuple[Floats, Floats, float]]) -> tuple[Floats, Flo
         place = np.searchsorted(at, times, side="right") - 1
         is_known = (place >= 0) & (times <= end)
         row[is_known] = values[place[is_known]]
+    columns[~(np.abs(columns) < MAX_NUMBER)] = np.nan
     known = (~np.isnan(columns)).sum(axis=0)
     kept = known >= max(1.0, _FEWEST * len(runs))
     means, halves = [], []
