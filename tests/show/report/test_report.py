@@ -424,3 +424,10 @@ def test_units_of_columns(queue: Path) -> None:
     assert plan.columns["load"].unit == "1"
     units = {"cm": "m", "km/h": "m/s", "deg/s": "rad/s", "%": "1", "Hz": "Hz", "N": "N", "kW": "m^2 kg/s^3", "min": "s"}
     assert {unit: si_unit(unit) for unit in units} == units
+
+
+def test_signals_that_are_infinite_leave_gaps_in_their_means() -> None:
+    times = np.array([0.0, 1.0, 2.0])
+    runs = [(times, np.array([1.0, end, 3.0]), 2.0) for end in (np.inf, -np.inf)]
+    at, means, halves = over_time(runs)
+    assert (at.tolist(), means.tolist(), halves.tolist()) == ([0.0, 2.0], [1.0, 3.0], [0.0, 0.0])
